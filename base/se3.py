@@ -1,0 +1,96 @@
+"""Rotations and rigid motions in closed form.
+
+A pose is a 4x4 homogeneous matrix, a twist a 6-vector (rotation vector, translation part); every function takes and
+returns arrays with any leading dimensions. Formulas: Murray, Li & Sastry, A Mathematical Introduction to Robotic
+Manipulation (1994), App. A; series below `SMALL` keep them exact to rounding.
+"""
+
+import numpy as np
+
+SMALL = 1e-4
+
+
+def hat(vector):
+    """Skew matrices (..., 3, 3) of vectors (..., 3): hat(a) b = a x b."""
+    v = np.asarray(vector, float)
+    out = np.zeros(v.shape[:-1] + (3, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return out - np.swapaxes(out, -1, -2)
+
+
+def _coefficients(angle):
+    """sin t/t, (1-cos t)/t^2, (t-sin t)/t^3 for angles t of any shape."""
+    t2 = angle * angle
+    small = angle < SMALL
+    t = np.where(small, 1.0, angle)
+    a = np.where(small, 1 - t2 / 6, np.sin(t) / t)
+    b = np.where(small, 0.5 - t2 / 24, 2 * np.sin(t / 2) ** 2 / t**2)
+    c = np.where(small, 1 / 6 - t2 / 120, (t - np.sin(t)) / t**3)
+    return a[..., None, None], b[..., None, None], c[..., None, None]
+
+
+def exp_rotation(vector):
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
+    W = hat(vector)
+    a, b, _ = _coefficients(np.linalg.norm(vector, axis=-1))
+    return np.eye(3) + a * W + b * W @ W
+
+
+def log_rotation(rotation):
+    """Rotation vectors (..., 3) of rotation matrices (..., 3, 3), angle in [0, pi], through unit quaternions."""
+    from scipy.spatial.transform import Rotation
+
+    R = np.asarray(rotation, float)
+    return Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-2] + (3,))
+
+
+def exp_pose(twist):
+    """Poses (..., 4, 4) of twists (..., 6) = (rotation vector, translation part)."""
+    twist = np.asarray(twist, float)
+    w, v = twist[..., :3], twist[..., 3:]
+    W = hat(w)
+    a, b, c = _coefficients(np.linalg.norm(w, axis=-1))
+    out = np.zeros(twist.shape[:-1] + (4, 4))
+    WW = W @ W
+    out[..., :3, :3] = np.eye(3) + a * W + b * WW
+    out[..., :3, 3] = ((np.eye(3) + b * W + c * WW) @ v[..., None])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def log_pose(pose):
+    """Twists (..., 6) of poses (..., 4, 4); inverse of `exp_pose` for rotation angles below pi."""
+    pose = np.asarray(pose, float)
+    w = log_rotation(pose[..., :3, :3])
+    W = hat(w)
+    t = np.linalg.norm(w, axis=-1)
+    small = t < 1e-3
+    ts = np.where(small, 1.0, t)
+    coefficient = np.where(small, 1 / 12 + t * t / 720, (1 - 0.5 * ts / np.tan(ts / 2)) / ts**2)
+    inverse = np.eye(3) - 0.5 * W + coefficient[..., None, None] * W @ W
+    v = (inverse @ pose[..., :3, 3, None])[..., 0]
+    return np.concatenate([w, v], axis=-1)
+
+
+def inverse_pose(pose):
+    """Inverse rigid motions (..., 4, 4)."""
+    pose = np.asarray(pose, float)
+    Rt = np.swapaxes(pose[..., :3, :3], -1, -2)
+    out = np.zeros_like(pose)
+    out[..., :3, :3] = Rt
+    out[..., :3, 3] = -(Rt @ pose[..., :3, 3, None])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def make_pose(rotation, origin):
+    """Poses (..., 4, 4) of rotations (..., 3, 3) and origins (..., 3)."""
+    rotation, origin = np.asarray(rotation, float), np.asarray(origin, float)
+    out = np.zeros(rotation.shape[:-2] + (4, 4))
+    out[..., :3, :3], out[..., :3, 3], out[..., 3, 3] = rotation, origin, 1.0
+    return out
+
+
+def transform(pose, points):
+    """Points (n, 3) moved by one pose (4, 4)."""
+    return np.asarray(points) @ pose[:3, :3].T + pose[:3, 3]

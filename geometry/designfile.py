@@ -1,0 +1,111 @@
+"""design.toml: a manipulator, its pressure and where its base stands, complete and re-runnable."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from base.errors import InputError
+from base.files import write_text
+from base.materials import material_from_table, material_to_table
+from base.tables import from_table, number, read_toml, refuse_unknown, to_table, toml_text
+from geometry.parameters import Manipulator, Segment
+
+SCHEMA = "pneunet-design-1"
+
+
+@dataclass(frozen=True)
+class Design:
+    """What the commands mesh, shape and solve read.
+
+    pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm; target: text
+    that names the target file; result: free table of numbers that `pneunet design` adds and nobody reads back.
+    """
+
+    manipulator: Manipulator
+    pressure: float
+    name: str = "design"
+    base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
+    mesh_size: float = 2.0
+    target: str = ""
+    result: dict = field(default_factory=dict)
+
+
+def read_design(path):
+    """The Design in a TOML file; InputError with file, table and key otherwise."""
+    data = read_toml(path)
+    refuse_unknown(data, ["schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "segment", "base", "result"], str(path))
+    if data.get("schema", SCHEMA) != SCHEMA:
+        raise InputError(f"{path}: schema = '{data['schema']}' is not '{SCHEMA}'")
+    for key in ("pressure_kPa", "material", "segment"):
+        if key not in data:
+            raise InputError(f"{path}: key '{key}' is missing")
+    pressure = number(data["pressure_kPa"], "pressure_kPa", str(path))
+    if not 0 < pressure <= 2000:
+        raise InputError(f"{path}: pressure_kPa = {pressure:g} must lie in 0..2000 kPa")
+    mesh_size = number(data.get("mesh_size_mm", 2.0), "mesh_size_mm", str(path))
+    if not 0.1 <= mesh_size <= 20:
+        raise InputError(f"{path}: mesh_size_mm = {mesh_size:g} must lie in 0.1..20 mm")
+    material = material_from_table(data["material"], f"{path} [material]")
+    if not isinstance(data["segment"], list):
+        raise InputError(f"{path}: segments are written [[segment]], with double brackets")
+    segments = []
+    for i, row in enumerate(data["segment"], start=1):
+        row = dict(row)
+        own = row.pop("material", None)
+        where = f"{path} [[segment]] {i}"
+        segment_material = material_from_table(own, f"{where} material") if own is not None else material
+        segments.append(from_table(Segment, row, where, material=segment_material))
+    try:
+        manipulator = Manipulator(tuple(segments))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return Design(
+        manipulator,
+        pressure * 1e-3,
+        name=str(data.get("name", "design")),
+        base_pose=_base_pose(data.get("base", {}), f"{path} [base]"),
+        mesh_size=float(mesh_size),
+        target=str(data.get("target", "")),
+        result=data.get("result", {}),
+    )
+
+
+def _base_pose(table, where):
+    refuse_unknown(table, ["origin_mm", "rotation"], where)
+    pose = np.eye(4)
+    for key, shape, part in (("origin_mm", (3,), pose[:3, 3]), ("rotation", (3, 3), pose[:3, :3])):
+        if key in table:
+            try:
+                value = np.array(table[key], float)
+            except (TypeError, ValueError):
+                value = np.empty(0)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise InputError(f"{where}: '{key}' must be numbers of shape {shape}")
+            part[...] = value
+    if abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max() > 1e-6 or np.linalg.det(pose[:3, :3]) < 0:
+        raise InputError(f"{where}: 'rotation' is not a rotation matrix")
+    return pose
+
+
+def design_tables(design):
+    """The nested tables of design.toml; a segment's material is written only where it differs from the first one's."""
+    first = design.manipulator.segments[0].material
+    rows = []
+    for s in design.manipulator.segments:
+        row = to_table(s)
+        if s.material != first:
+            row["material"] = material_to_table(s.material)
+        rows.append(row)
+    tables = {"schema": SCHEMA, "name": design.name, "pressure_kPa": float(f"{design.pressure * 1e3:.12g}"), "mesh_size_mm": design.mesh_size}
+    if design.target:
+        tables["target"] = design.target
+    tables["material"] = material_to_table(first)
+    tables["segment"] = rows
+    tables["base"] = {"origin_mm": design.base_pose[:3, 3], "rotation": design.base_pose[:3, :3]}
+    if design.result:
+        tables["result"] = design.result
+    return tables
+
+
+def write_design(path, design):
+    write_text(path, toml_text(design_tables(design)))

@@ -1,0 +1,195 @@
+"""The parameters of segments and manipulators, validated; `Manipulator` is what every package builds or predicts.
+
+Body axes: x along the undeformed centreline, y width, z height, z = 0 on the channel axis; mm, degrees. Chambers are
+upright boxes whose long side makes `angle` with x in plan. A one-sided segment has them above a core; a twisting one
+has a second set, the first turned by half a turn about x, so that twist adds up and bending cancels.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from base.errors import InputError
+from base.materials import NeoHookean
+from base.tables import quantity
+
+ONE_SIDED, TWISTING = "one-sided", "twisting"
+KINDS = (ONE_SIDED, TWISTING)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One run of equal chambers. "normal" = across the chamber."""
+
+    kind: str = quantity(None, note="'one-sided' (bends, helical away from 90 deg) or 'twisting'")
+    angle: float = quantity("deg", note="between the chambers' long side and the x axis; 90 = across the beam")
+    chambers: int = quantity(None, note="whole chambers (pairs, for a twisting segment)")
+    width: float = quantity("mm", 12.0, "body width")
+    chamber_height: float = quantity("mm", 4.0, "cavity, floor to ceiling")
+    cavity_thickness: float = quantity("mm", 2.0, "cavity, normal")
+    wall: float = quantity("mm", 1.0, "between cavity and gap, normal")
+    gap: float = quantity("mm", 1.0, "between neighbouring chambers, normal")
+    top_wall: float = quantity("mm", 1.0, "above the cavity")
+    side_wall: float = quantity("mm", 1.0, "at both ends of the cavity's long side, along y")
+    base_thickness: float = quantity("mm", 2.0, "below the channel (one-sided)")
+    roof: float = quantity("mm", 1.0, "core above the channel, under the gaps")
+    channel_width: float = quantity("mm", 4.0, "air channel, y")
+    channel_height: float = quantity("mm", 2.0, "air channel, z")
+    cavity_floor: float = quantity("mm", 1.0, "z of the cavity's floor; at most half the channel height")
+    end_margin: float = quantity("mm", 2.0, "bare core beyond the outermost corner of a chamber, each end")
+    material: NeoHookean = NeoHookean(mu=0.317)
+
+    def __post_init__(self):
+        if self.kind not in KINDS:
+            raise InputError(f"kind = '{self.kind}' is not known: write 'one-sided' or 'twisting'")
+        if not 30 <= self.angle <= 150:
+            raise InputError(f"angle_deg = {self.angle:g} is outside 30..150")
+        if self.chambers < 1:
+            raise InputError(f"chambers = {self.chambers}: a segment needs at least 1")
+        for name in ("width", "chamber_height", "cavity_thickness", "wall", "gap", "top_wall", "side_wall", "base_thickness",
+                     "roof", "channel_width", "channel_height", "end_margin"):
+            value = getattr(self, name)
+            if not value > 0:
+                raise InputError(f"{name}_mm = {value:g} must be larger than 0")
+            if not 0.05 <= value <= 500:
+                raise InputError(f"{name}_mm = {value:g} is not a castable size (0.05..500 mm): is it in metres?")
+        if 2 * self.side_wall >= self.width:
+            raise InputError(f"side_wall_mm = {self.side_wall:g}: two side walls do not fit into width_mm = {self.width:g}")
+        if self.channel_width > self.cavity_width:
+            raise InputError(
+                f"channel_width_mm = {self.channel_width:g} is wider than the cavity ({self.cavity_width:g} mm = width - 2 side walls)"
+            )
+        lowest = 0.0 if self.kind == TWISTING else -self.channel_height / 2
+        if not lowest <= self.cavity_floor <= self.channel_height / 2:
+            raise InputError(
+                f"cavity_floor_mm = {self.cavity_floor:g} must lie in {lowest:g}..{self.channel_height / 2:g} (half the channel height), "
+                "else the cavity does not open into the channel"
+            )
+        if self.chamber_top <= self.core_top:
+            raise InputError(
+                f"chamber_height_mm = {self.chamber_height:g}: the chamber (top at z = {self.chamber_top:g} mm) does not rise above "
+                f"the core (z = {self.core_top:g} mm)"
+            )
+        if self.length > 2000:
+            raise InputError(f"chambers = {self.chambers}: the segment would be {self.length:.0f} mm long (at most 2000)")
+
+    @property
+    def key(self):
+        """Hashable identity of the cell: everything that the strains of the middle of a long segment depend on."""
+        return replace(self, chambers=1, end_margin=1.0)
+
+    @property
+    def mirrored(self):
+        """The mirror image: 180 - angle, opposite handedness."""
+        return replace(self, angle=180.0 - self.angle)
+
+    @cached_property
+    def sin(self):
+        return float(np.sin(np.radians(self.angle)))
+
+    @cached_property
+    def cot(self):
+        """cot(angle); 0 exactly at 90 degrees, odd about it."""
+        return float(np.tan(np.radians(90.0 - self.angle)))
+
+    @property
+    def chamber_thickness(self):
+        """Outer thickness of a chamber, normal, mm."""
+        return self.cavity_thickness + 2 * self.wall
+
+    @property
+    def pitch(self):
+        """Axial distance of neighbouring chambers, mm."""
+        return (self.chamber_thickness + self.gap) / self.sin
+
+    @property
+    def cavity_width(self):
+        return self.width - 2 * self.side_wall
+
+    @property
+    def core_top(self):
+        return self.channel_height / 2 + self.roof
+
+    @property
+    def core_bottom(self):
+        return -self.core_top if self.kind == TWISTING else -self.channel_height / 2 - self.base_thickness
+
+    @property
+    def cavity_top(self):
+        return self.cavity_floor + self.chamber_height
+
+    @property
+    def chamber_top(self):
+        return self.cavity_top + self.top_wall
+
+    @property
+    def chamber_bottom(self):
+        """Lowest point of the body, z in mm."""
+        return -self.chamber_top if self.kind == TWISTING else self.core_bottom
+
+    @property
+    def sides(self):
+        """+1 for the chambers above the core, -1 for the set turned by half a turn about x."""
+        return (1, -1) if self.kind == TWISTING else (1,)
+
+    @property
+    def end_length(self):
+        """Passive length at each end, mm: wedge of the slanted chamber and the bare core beyond it."""
+        return self.width / 2 * abs(self.cot) + self.end_margin
+
+    @property
+    def active_length(self):
+        """(N-1) pitches and one chamber, mm."""
+        return (self.chambers - 1) * self.pitch + self.chamber_thickness / self.sin
+
+    @property
+    def length(self):
+        return self.active_length + 2 * self.end_length
+
+    @property
+    def chamber_positions(self):
+        """Centres of the chambers on the axis, x in mm from the segment's start, shape (chambers,)."""
+        first = self.end_length + self.chamber_thickness / self.sin / 2
+        return first + self.pitch * np.arange(self.chambers)
+
+
+@dataclass(frozen=True)
+class Manipulator:
+    """Segments in a row, joined on the channel axis, sharing one cavity."""
+
+    segments: tuple
+
+    def __post_init__(self):
+        object.__setattr__(self, "segments", tuple(self.segments))
+        if not self.segments:
+            raise InputError("segment: at least one [[segment]] is needed")
+        for i, (a, b) in enumerate(zip(self.segments, self.segments[1:]), start=1):
+            shared = min(a.core_top, b.core_top) - max(a.core_bottom, b.core_bottom)
+            if shared < max(a.channel_height, b.channel_height) or min(a.width, b.width) <= max(a.channel_width, b.channel_width):
+                raise InputError(f"segment {i} and {i + 1}: the channel of one does not fit into the core of the other")
+
+    @property
+    def length(self):
+        return sum(s.length for s in self.segments)
+
+    @property
+    def starts(self):
+        """Undeformed arc length at which each segment begins, mm, shape (segments,)."""
+        return np.concatenate([[0.0], np.cumsum([s.length for s in self.segments])[:-1]])
+
+    @property
+    def pieces(self):
+        """(segment index or None if passive, length in mm) from base to tip: what a rod model sees."""
+        out = []
+        for i, s in enumerate(self.segments):
+            out += [(None, s.end_length), (i, s.active_length), (None, s.end_length)]
+        return out
+
+    @property
+    def chambers(self):
+        return sum(s.chambers for s in self.segments)
+
+    @property
+    def mirrored(self):
+        return Manipulator(tuple(s.mirrored for s in self.segments))
