@@ -1,0 +1,115 @@
+"""Target, reduced prediction and finite elements of one run against each other, all in target coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from base import se3
+from base.errors import ConvergenceError
+from base.strains import RodStrains
+from design.labels import plain
+from design.metrics import Errors, compare
+from reduced.model import predict
+
+# what the words of the verdict mean, in % of length (RMS of points paired by arc length)
+CONFIRMS, ROUGHLY = 2.0, 5.0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Curves (n, 3) in mm in target coordinates, and `Errors` between them; None where a part is missing.
+
+    reduced: at the design pressure. solved: finite elements at their last pressure; reduced_at_solve, strains: the
+    reduced model re-evaluated there. notes: what a reader must know to read the numbers rightly.
+    """
+
+    reduced: np.ndarray | None
+    reduced_at_solve: np.ndarray | None
+    strains: RodStrains | None
+    solved: np.ndarray | None
+    reduced_target: Errors | None
+    solved_target: Errors | None
+    reduced_solved: Errors | None
+    notes: tuple
+
+    @classmethod
+    def of(cls, run, model):
+        design, notes = run.design, []
+        solved = at_solve = strains = None
+        reduced = _predict(design, design.pressure, model, notes)
+        if run.centreline is not None and reduced is not None:
+            difference = compare(run.centreline[1], reduced)
+            if difference.hausdorff > 1e-3 * difference.reference_length:
+                notes.append(
+                    f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives for design.toml now: "
+                    "the design was edited, or predicted by another model; this report re-evaluates the analytic model."
+                )
+        if run.solve is not None:
+            solved = se3.transform(design.base_pose, run.solve.points)
+            if stopped_short(run):
+                notes.append(
+                    f"The finite element solution stops at {plain(run.solve.pressure * 1e3)} kPa, below the design pressure of "
+                    f"{plain(design.pressure * 1e3)} kPa. It is compared with the reduced model re-evaluated at "
+                    f"{plain(run.solve.pressure * 1e3)} kPa; its distance to the target is that of a body not fully inflated."
+                )
+            at_solve = _predict(design, run.solve.pressure, model, notes)
+            if at_solve is not None:
+                each = [model.strains(s, run.solve.pressure) for s in design.manipulator.segments]
+                strains = RodStrains([s.e for s in each], [s.k for s in each])
+        return cls(
+            reduced, at_solve, strains, solved,
+            _errors(reduced, run.target), _errors(solved, run.target), _errors(at_solve, solved), tuple(dict.fromkeys(notes)),
+        )
+
+
+def stopped_short(run):
+    """Whether the finite element solution ended below the design pressure (by more than rounding)."""
+    return run.solve is not None and run.solve.pressure < run.design.pressure * (1 - 1e-6)
+
+
+def _predict(design, pressure, model, notes):
+    try:
+        return predict(design.manipulator, pressure, model, base_pose=design.base_pose).points
+    except ConvergenceError as error:
+        notes.append(f"The reduced model has no solution at {plain(pressure * 1e3)} kPa: {error}")
+        return None
+
+
+def _errors(curve, reference):
+    return None if curve is None or reference is None else compare(curve, reference)
+
+
+def overlap(run):
+    """Depth in mm of the deepest overlap of walls in the last step; 0 when no walls overlap."""
+    return max([0.0] + [-distance for *_, distance in run.solve.walls]) if run.solve else 0.0
+
+
+def verdict(run, comparison):
+    """The result in one honest sentence (two when walls overlap)."""
+    c, design = comparison, run.design
+    promise = ""
+    if c.reduced_target:
+        promise = f"the reduced model predicts to follow the target within {_mm(c.reduced_target)}"
+    if c.solved is None:
+        told = promise or "there is neither a target nor a finite element solution to judge the prediction by"
+        return f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet." if promise else f"{told[0].upper()}{told[1:]}."
+    pressure = f"{plain(run.solve.pressure * 1e3)} kPa"
+    if c.reduced_solved is None:
+        sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"
+    else:
+        percent = c.reduced_solved.percent(c.reduced_solved.rms)
+        word = "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
+        sentence = (f"At {pressure} the finite element solution of the whole manipulator {word} the reduced prediction: "
+                    f"they differ by {_mm(c.reduced_solved)}")
+    if promise:
+        sentence += f"; {promise}, the finite element body misses it by {_mm(c.solved_target)}"
+    if stopped_short(run):
+        sentence += f" (it stopped short of the design pressure, {plain(design.pressure * 1e3)} kPa)"
+    depth = overlap(run)
+    if depth > 0:
+        sentence += f". Walls overlap by up to {depth:.2f} mm, so the finite element shape is not what a real body would take"
+    return sentence + "."
+
+
+def _mm(errors):
+    return f"{errors.rms:.2f} mm RMS ({errors.percent(errors.rms):.1f} % of length)"

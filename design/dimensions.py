@@ -1,0 +1,179 @@
+"""Drawing at a fixed scale with dimension lines: distances of lines and text are inches on paper, the part is in mm."""
+
+import numpy as np
+
+INK, LINE = "#1b1f24", "#55606b"
+TEXT_SIZE = 7.5
+
+
+def text_width(text, size=TEXT_SIZE):
+    """Estimated width of a line of text in inches."""
+    return 0.56 * size * len(text) / 72
+
+
+def spread(positions, distance):
+    """Positions moved as little as needed to be `distance` apart, order kept (least squares by pooling)."""
+    order = np.argsort(positions, kind="stable")
+    wanted = np.asarray(positions, float)[order] - distance * np.arange(len(order))
+    pools = []  # (mean, count): neighbours that collide share the mean of what they want
+    for value in wanted:
+        pools.append((value, 1))
+        while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
+            (a, n), (b, m) = pools[-2:]
+            pools[-2:] = [((a * n + b * m) / (n + m), n + m)]
+    out = np.empty(len(order))
+    out[order] = np.repeat([p[0] for p in pools], [p[1] for p in pools]) + distance * np.arange(len(order))
+    return out
+
+
+class SheetView:
+    """A rectangle (left, bottom, width, height, inches) of a figure that shows (x, y) in mm at `scale` inches per mm.
+
+    (x, y) lies at the rectangle's middle, moved by `right` and `up` inches.
+    """
+
+    def __init__(self, figure, rectangle, scale, x, y, right=0.0, up=0.0):
+        left, bottom, width, height = rectangle
+        sheet_width, sheet_height = figure.get_size_inches()
+        self.scale = scale
+        self.ax = figure.add_axes([left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height])
+        x, y = x - right / scale, y - up / scale
+        self.x0, self.x1 = x - width / 2 / scale, x + width / 2 / scale
+        self.y0, self.y1 = y - height / 2 / scale, y + height / 2 / scale
+        self.ax.set_xlim(self.x0, self.x1)
+        self.ax.set_ylim(self.y0, self.y1)
+        self.ax.set_axis_off()
+
+    def mm(self, inches):
+        return inches / self.scale
+
+    def text(self, x, y, text, ha="center", va="center", size=TEXT_SIZE, weight="normal", rotation=0):
+        self.ax.text(x, y, text, ha=ha, va=va, fontsize=size, weight=weight, color=INK, rotation=rotation)
+
+    def title(self, x, y, text):
+        """The name of a view, ending at (x, y)."""
+        self.text(x, y, text, ha="right", size=9, weight="bold")
+
+    def heading(self, text):
+        """A title centred at the top of the rectangle."""
+        self.text((self.x0 + self.x1) / 2, self.y1 - self.mm(0.14), text, size=8.5, weight="bold")
+
+    def line(self, points, width=0.6, style="-", colour=LINE):
+        x, y = zip(*points)
+        self.ax.plot(x, y, linewidth=width, linestyle=style, color=colour, solid_capstyle="butt")
+
+    def polygon(self, corners, face, width=0.8, style="-", alpha=1.0):
+        from matplotlib.patches import Polygon
+
+        self.ax.add_patch(Polygon(corners, closed=True, facecolor=face, edgecolor=INK if width else "none", linewidth=width, linestyle=style, alpha=alpha))
+
+    def cut(self, solids, voids, colour, clip=None):
+        """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); the cut at `clip` x is a break."""
+        from matplotlib.patches import Rectangle
+
+        def add(box, **style):
+            x0, x1, y0, y1 = box
+            if clip:
+                x0, x1 = max(x0, clip[0]), min(x1, clip[1])
+            self.ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **style))
+
+        # the edges first, then the faces above them: inner halves of edges inside the union disappear
+        for boxes, face in ((solids, colour), (voids, "white")):
+            for box in boxes:
+                add(box, fill=False, edgecolor=INK, linewidth=2.0)
+            for box in boxes:
+                add(box, facecolor=face, edgecolor="none")
+        if clip:
+            low, high = min(b[2] for b in solids[:1]), max(b[3] for b in solids[:1])
+            for x in clip:
+                self.ax.plot([x, x], [low, high], color="white", linewidth=2.4)
+                self.ax.plot([x, x], [low - self.mm(0.05), high + self.mm(0.05)], color=LINE, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
+
+    def axes_cross(self):
+        """The channel axis as a small centre mark."""
+        r = self.mm(0.1)
+        self.line([(-r, 0), (r, 0)], width=0.6)
+        self.line([(0, -r), (0, r)], width=0.6)
+
+    def _arrows(self, a, b, inside):
+        style = {"arrowstyle": "-|>,head_length=0.35,head_width=0.12", "color": LINE, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0}
+        a, b = np.asarray(a, float), np.asarray(b, float)
+        if inside:
+            pairs = [((a + b) / 2, a), ((a + b) / 2, b)]
+        else:
+            out = (b - a) / np.linalg.norm(b - a) * self.mm(0.16)
+            pairs = [(a - out, a), (b + out, b)]
+            self.line([a, b], width=0.6)
+        for tail, head in pairs:
+            self.ax.annotate("", xy=head, xytext=tail, arrowprops=style)
+
+    def horizontal(self, x0, x1, y_part, y, text):
+        """A dimension between x0 and x1, its line at y, extension lines from y_part."""
+        over = self.mm(0.05) * np.sign(y - y_part)
+        for x in (x0, x1):
+            self.line([(x, y_part), (x, y + over)], width=0.35)
+        inside = (x1 - x0) * self.scale > 0.3
+        self._arrows((x0, y), (x1, y), inside)
+        if (x1 - x0) * self.scale > text_width(text) + 0.12:
+            self._on_line((x0 + x1) / 2, y, text)
+        else:
+            self.text(x1 + self.mm(0.08 if inside else 0.2), y, text, ha="left")
+
+    def between(self, x0, x1, y, text):
+        """The link of a chain (`chain_below`) that has room for its text on the line."""
+        self.line([(x0, y), (x1, y)], width=0.6)
+        self._on_line((x0 + x1) / 2, y, text)
+
+    def _on_line(self, x, y, text):
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+        self.ax.text(x, y, text, ha="center", va="center", fontsize=TEXT_SIZE, color=INK, bbox=box)
+
+    def vertical(self, y0, y1, x_part, x, text):
+        """A dimension between y0 and y1, its line at x left of the part."""
+        for y in (y0, y1):
+            self.line([(x_part, y), (x - self.mm(0.05), y)], width=0.35)
+        self._arrows((x, y0), (x, y1), (y1 - y0) * self.scale > 0.3)
+        self.text(x - self.mm(0.06), (y0 + y1) / 2, text, ha="right")
+
+    def ladder(self, intervals, x_part, x):
+        """Neighbouring vertical dimensions (y0, y1, text) in one column at x, their labels spread so that none overlap."""
+        middles = [(a + b) / 2 for a, b, _ in intervals]
+        levels = spread(middles, self.mm(0.16))
+        for y in {y for a, b, _ in intervals for y in (a, b)}:
+            self.line([(x_part, y), (x + self.mm(0.05), y)], width=0.35)
+        for (a, b, text), middle, level in zip(intervals, middles, levels):
+            self.line([(x, a), (x, b)], width=0.6)
+            for y in (a, b):
+                self.line([(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))], width=0.9, colour=INK)
+            self.line([(x, middle), (x + self.mm(0.18), level), (x + self.mm(0.24), level)], width=0.35)
+            self.text(x + self.mm(0.27), level, text, ha="left")
+
+    def chain_below(self, intervals, y_part, y):
+        """Short neighbouring horizontal dimensions (x0, x1, text) with upright labels below the line."""
+        levels = spread([(a + b) / 2 for a, b, _ in intervals], self.mm(0.13))
+        for (a, b, text), level in zip(intervals, levels):
+            for x in (a, b):
+                self.line([(x, y_part), (x, y - self.mm(0.05))], width=0.35)
+                self.line([(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))], width=0.9, colour=INK)
+            self.line([(a, y), (b, y)], width=0.6)
+            self.line([((a + b) / 2, y), (level, y - self.mm(0.08))], width=0.35)
+            self.text(level, y - self.mm(0.1), text, va="top", rotation=90, size=7)
+
+    def angle(self, corner, degrees, radius):
+        """The angle between a line through `corner` and the x axis: extended line, arc of `radius` inches and its value."""
+        from matplotlib.patches import Arc
+
+        corner, r = np.asarray(corner, float), self.mm(radius)
+        direction = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+        self.line([corner, corner + 1.15 * r * direction], width=0.5)
+        self.line([corner, corner + [1.15 * r, 0]], width=0.5)
+        self.ax.add_patch(Arc(corner, 2 * r, 2 * r, theta1=0, theta2=degrees, color=LINE, linewidth=0.6))
+        half = np.radians(degrees / 2)
+        self.text(*(corner + 0.62 * r * np.array([np.cos(half), np.sin(half)])), f"{degrees:.4g}°", size=7)
+
+    def balloon(self, x, y, number, text, colour):
+        """A numbered circle with a line of text at its right, centred on x."""
+        shift = self.mm(0.13 + text_width(text, 8.5)) / 2
+        self.ax.text(x - shift, y, str(number), ha="center", va="center", fontsize=9, weight="bold", color=INK,
+                     bbox={"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": INK, "linewidth": 0.7})
+        self.text(x - shift + self.mm(0.17), y, text, ha="left", size=8.5)

@@ -1,0 +1,102 @@
+"""What stands in a run directory, read for pictures and the report; parts that are not there yet are None."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from base.errors import InputError
+from base.files import read_columns, read_csv
+from base.strains import RodStrains
+from geometry.designfile import Design, read_design
+
+POINTS = ["x_mm", "y_mm", "z_mm"]
+STEP_COLUMNS = ["step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
+                "smallest_wall_distance_mm", "largest_stretch", "seconds"]
+
+
+@dataclass(frozen=True)
+class Solve:
+    """The finite element solution. Lengths in mm, body frame; kPa as in the files.
+
+    steps: {column: (n,)}; pressure of the last accepted step in MPa; s (m,), points (m, 3): its centreline;
+    strains: RodStrains of shape (segments, 3) at that step; walls: [(segment 1.., side +1/-1, gap 1.., distance)];
+    solution: the ParaView file, or None; record: run.json.
+    """
+
+    steps: dict
+    pressure: float
+    s: np.ndarray
+    points: np.ndarray
+    strains: RodStrains
+    walls: list
+    solution: Path | None
+    record: dict
+
+
+@dataclass(frozen=True)
+class Run:
+    """directory; design; target (n, 3) and centreline (s (m,), points (m, 3)) in target coordinates; mesh, record: the
+    JSON files; solve."""
+
+    directory: Path
+    design: Design
+    target: np.ndarray | None
+    centreline: tuple | None
+    record: dict
+    mesh: dict
+    solve: Solve | None
+
+
+def read_run(directory):
+    """The Run in a directory that holds at least design.toml; InputError otherwise."""
+    directory = Path(directory)
+    if not (directory / "design.toml").is_file():
+        raise InputError(f"{directory}: holds no design.toml: give the folder that `pneunet design -o` wrote")
+    target = directory / "target.csv"
+    centreline = directory / "centreline.csv"
+    columns = read_columns(centreline, ["s_mm", *POINTS]) if centreline.is_file() else None
+    return Run(
+        directory,
+        read_design(directory / "design.toml"),
+        read_columns(target, POINTS) if target.is_file() else None,
+        None if columns is None else (columns[:, 0], columns[:, 1:]),
+        _json(directory / "run.json"),
+        _json(directory / "mesh" / "mesh.json"),
+        _solve(directory / "solve"),
+    )
+
+
+def _json(path):
+    """The JSON object in a file; {} when it is not there."""
+    if not path.is_file():
+        return {}
+    try:
+        return json.loads(path.read_text())
+    except ValueError as error:
+        raise InputError(f"{path}: not valid JSON ({error})") from None
+
+
+def _solve(directory):
+    """The solve with at least one accepted step, else None."""
+    if not (directory / "steps.csv").is_file() or len(read_csv(directory / "steps.csv")[1]) == 0:
+        return None
+    table = read_columns(directory / "steps.csv", STEP_COLUMNS)
+    last = table[-1, 0]
+    centrelines = read_columns(directory / "centrelines.csv", ["step", "s_mm", *POINTS])
+    centreline = centrelines[centrelines[:, 0] == last]
+    strains = read_columns(directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"])
+    strains = strains[strains[:, 0] == last]
+    walls = directory / "walls.csv"
+    solution = directory / "solution.pvd"
+    return Solve(
+        steps=dict(zip(STEP_COLUMNS, table.T)),
+        pressure=table[-1, 1] * 1e-3,
+        s=centreline[:, 1],
+        points=centreline[:, 2:],
+        strains=RodStrains(strains[:, 1:4], strains[:, 4:7]),
+        walls=[(int(a), int(b), int(c), d) for a, b, c, d in read_columns(walls, ["segment", "side", "gap", "distance_mm"])] if walls.is_file() else [],
+        solution=solution if solution.is_file() else None,
+        record=_json(directory / "run.json"),
+    )

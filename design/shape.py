@@ -1,0 +1,112 @@
+"""`pneunet shape`: the reduced model alone, at any pressures: centrelines, bodies, a picture and an animation."""
+
+from pathlib import Path
+
+import numpy as np
+
+from base.errors import ConvergenceError, InputError
+from base.files import atomic_path, output_directory, write_csv
+from base.record import write_record
+from design.labels import plain
+from geometry.designfile import read_design
+from reduced.model import AnalyticModel, predict
+
+FRAMES = 24
+FRAME_PIXELS = (540, 432)
+
+
+def run_shape(design_path, pressures, directory, say=print, model=None):
+    """Shapes of a design at `pressures` (MPa), written to directory/shape.
+
+    centrelines.csv (pressure_kPa, s_mm, x_mm, y_mm, z_mm in target coordinates), body_<pressure>kPa.vtp, bodies.png,
+    inflation.gif, run.json. Pressures beyond the model's limit: the others are written, then ConvergenceError names
+    what is there. Returns the folder.
+    """
+    if not pressures:
+        raise InputError("--pressure-kPa: give at least one pressure")
+    for p in pressures:
+        if not (np.isfinite(p) and 0 <= p <= 2.0):
+            raise InputError(f"--pressure-kPa: {p * 1e3:g} is outside 0..2000 kPa")
+    design = read_design(design_path)
+    folder = output_directory(Path(directory) / "shape")
+    model = model or AnalyticModel()
+    shapes, failed = {}, {}
+    for p in sorted(set(pressures)):
+        try:
+            shapes[p] = predict(design.manipulator, p, model, base_pose=design.base_pose)
+        except ConvergenceError as error:
+            failed[p] = str(error)
+    if not shapes:
+        raise ConvergenceError(f"no shape at {_list(failed)} kPa: {next(iter(failed.values()))}")
+    write_csv(
+        folder / "centrelines.csv",
+        ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"],
+        [[p * 1e3, s, *point] for p, line in shapes.items() for s, point in zip(line.s, line.points)],
+    )
+    say(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
+    for p, line in shapes.items():
+        tip = line.points[-1]
+        say(f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm")
+    try:
+        _pictures(design, shapes, model, folder, say)
+    except ImportError as error:
+        say(f"no pictures: {error}; install them with: pip install 'pneunet[pictures]'")
+    write_record(folder, design=str(design_path), model=model.name, pressures_kPa=[p * 1e3 for p in shapes],
+                 failed_kPa={plain(p * 1e3): why for p, why in failed.items()})
+    if failed:
+        first = min(failed)
+        raise ConvergenceError(f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa")
+    return folder
+
+
+def _list(pressures):
+    return ", ".join(plain(p * 1e3) for p in pressures)
+
+
+def _pictures(design, shapes, model, folder, say):
+    from design.bodies import body_mesh, edges, view_of
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    bodies = {p: body_mesh(design.manipulator, p, model, design.base_pose) for p in shapes}
+    for p, body in bodies.items():
+        with atomic_path(folder / f"body_{plain(p * 1e3)}kPa.vtp") as temporary:
+            body.save(temporary)
+    highest = max(shapes)
+    view = view_of(np.vstack([body.points for body in bodies.values()]))
+    colours = {p: to_hex(colormaps["viridis_r"](0.1 + 0.85 * p / highest if highest else 0.5)) for p in bodies}
+    things = [thing for p, body in bodies.items() for thing in ((body, {"color": colours[p]}), edges(body))]
+    _picture_of_all(design, view, things, colours, folder / "bodies.png")
+    say(f"bodies at every pressure: {folder / 'bodies.png'}")
+    if highest > 0:
+        _animation(design, highest, model, folder / "inflation.gif")
+        say(f"inflation from 0 to {plain(highest * 1e3)} kPa: {folder / 'inflation.gif'}")
+
+
+def _picture_of_all(design, view, things, colours, path):
+    from design.bodies import body_figure, render
+    from design.pictures import save
+    from matplotlib.patches import Patch
+
+    fig = body_figure(view, render(view, things), f"{design.name}: reduced model")
+    handles = [Patch(facecolor=colour, label=f"{plain(p * 1e3)} kPa") for p, colour in colours.items()]
+    fig.legend(handles=handles, loc="upper right", ncols=min(len(handles), 6), fontsize=8, frameon=False, bbox_to_anchor=(0.99, 0.945))
+    save(fig, path, dpi=130)
+
+
+def _animation(design, highest, model, path):
+    """A GIF that inflates to `highest` (MPa) and holds; 24 frames of a few kB each."""
+    from design.bodies import body_mesh, edges, painted, render, view_of
+    from PIL import Image, ImageDraw
+
+    pressures = highest * np.linspace(0, 1, FRAMES)
+    bodies = [body_mesh(design.manipulator, p, model, design.base_pose) for p in pressures]
+    view = view_of(np.vstack([body.points for body in bodies]))
+    frames = []
+    for p, body in zip(pressures, bodies):
+        frame = Image.fromarray(render(view, painted(body), FRAME_PIXELS))
+        ImageDraw.Draw(frame).text((12, 10), f"{p * 1e3:.0f} kPa", fill=(0, 0, 0))
+        frames.append(frame.quantize(64))
+    durations = [90] * (FRAMES - 1) + [1200]
+    with atomic_path(path) as temporary:
+        frames[0].save(temporary, save_all=True, append_images=frames[1:], duration=durations, loop=0)

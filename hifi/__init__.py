@@ -1,0 +1,1 @@
+"""What is true: incompressible mixed u-p hyperelasticity with follower pressure in dolfinx, under MPI."""

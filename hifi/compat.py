@@ -1,0 +1,104 @@
+"""The only place that knows the difference between dolfinx 0.5 (Debian 12) and 0.9 (Debian 13)."""
+
+import dolfinx
+import dolfinx.fem.petsc
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.io import gmshio
+
+from base.errors import InputError
+
+OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
+COMPILE_ARGUMENTS = ["-O2", "-march=native"]
+VERSION = dolfinx.__version__
+
+
+def mixed_space(mesh, degree=2):
+    """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure on tetrahedra."""
+    if OLD:
+        u = ufl.VectorElement("CG", mesh.ufl_cell(), degree)
+        p = ufl.FiniteElement("CG", mesh.ufl_cell(), degree - 1)
+        return fem.FunctionSpace(mesh, ufl.MixedElement([u, p]))
+    import basix.ufl
+
+    cell = mesh.basix_cell()
+    u = basix.ufl.element("Lagrange", cell, degree, shape=(mesh.geometry.dim,))
+    p = basix.ufl.element("Lagrange", cell, degree - 1)
+    return fem.functionspace(mesh, basix.ufl.mixed_element([u, p]))
+
+
+def lagrange_space(mesh, degree, components=1):
+    """Continuous Lagrange space, scalar or vector."""
+    if OLD:
+        space = fem.FunctionSpace if components == 1 else fem.VectorFunctionSpace
+        return space(mesh, ("CG", degree))
+    shape = () if components == 1 else (components,)
+    return fem.functionspace(mesh, ("Lagrange", degree, shape))
+
+
+def compile_form(form):
+    """A compiled form with the project's compiler arguments."""
+    options = {"cffi_extra_compile_args": COMPILE_ARGUMENTS}
+    return fem.form(form, **({"jit_params": options} if OLD else {"jit_options": options}))
+
+
+def expression(mesh, ufl_expression, points):
+    """Callable: local cells (n,) -> values (n, points, components) of a UFL expression at reference points."""
+    options = {"cffi_extra_compile_args": COMPILE_ARGUMENTS}
+    compiled = fem.Expression(ufl_expression, points, **({"jit_params": options} if OLD else {"jit_options": options}))
+
+    def evaluate(cells):
+        values = compiled.eval(cells) if OLD else compiled.eval(mesh, cells)
+        return np.asarray(values).reshape(len(cells), len(points), -1)
+
+    return evaluate
+
+
+def scatter_add(function):
+    """Add ghost contributions onto owners and copy them back."""
+    from dolfinx import la
+
+    mode = la.ScatterMode.add if OLD else la.InsertMode.add
+    function.x.scatter_reverse(mode)
+    function.x.scatter_forward()
+
+
+def read_mesh(path, comm):
+    """(mesh, cell tags, facet tags) of a gmsh file, read on rank 0 and distributed."""
+    # gmshio.read_from_msh of 0.5 fails by itself, and a failure on rank 0 alone would leave the others waiting
+    import gmsh
+
+    error = None
+    if comm.rank == 0:
+        gmsh.initialize()
+        gmsh.option.setNumber("General.Terminal", 0)
+        try:
+            gmsh.open(str(path))
+        except Exception as problem:
+            error = f"{path}: gmsh cannot read this mesh ({problem})"
+    try:
+        error = comm.bcast(error, root=0)
+        if error:
+            raise InputError(error)
+        return gmshio.model_to_mesh(gmsh.model, comm, 0, gdim=3)[:3]
+    finally:
+        if comm.rank == 0:
+            gmsh.finalize()
+
+
+def original_cell_index(mesh):
+    """(local cells,) index of each cell in the file it was read from."""
+    return np.asarray(mesh.topology.original_cell_index)
+
+
+def geometry_dofmap(mesh):
+    """(local cells, nodes per cell) geometry nodes of each cell."""
+    dofmap = mesh.geometry.dofmap
+    return dofmap.array.reshape(-1, dofmap.array.size // dofmap.num_nodes) if OLD else np.asarray(dofmap)
+
+
+def cell_dofs(space):
+    """(local cells, dofs per cell) blocked dofs of a space."""
+    cells = space.mesh.topology.index_map(space.mesh.topology.dim)
+    return np.array([space.dofmap.cell_dofs(c) for c in range(cells.size_local + cells.num_ghosts)])

@@ -1,0 +1,73 @@
+"""ParaView files: one .vtu per accepted step and a .pvd that lists those that are complete."""
+
+from pathlib import Path
+
+import numpy as np
+
+from base.files import atomic_path, write_text
+from hifi import compat
+
+QUADRATIC_TETRA = 24
+#: dolfinx's P2 node order -> VTK's
+TO_VTK = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
+
+
+class FieldWriter:
+    """Gathers fields on rank 0 and writes them with VTK, so that files are the same for any number of ranks.
+
+    Each .vtu appears by rename when it is whole, and only then in solution.pvd: a killed run leaves valid files.
+    """
+
+    def __init__(self, directory, problem, stretch):
+        self.directory, self.problem, self.stretch = Path(directory), problem, stretch
+        self.comm = problem.mesh.comm
+        index_map = problem.displacement_space.dofmap.index_map
+        self._owned = index_map.size_local
+        cells = compat.cell_dofs(problem.displacement_space)[: problem.mesh.topology.index_map(3).size_local]
+        local_to_global = index_map.local_to_global(np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32))
+        self._cells = self._gather(local_to_global[cells])
+        self._points = self._gather(problem.nodes[: self._owned])
+        self._listed = []
+
+    def _gather(self, rows):
+        parts = self.comm.gather(rows, root=0)
+        return np.concatenate(parts) if self.comm.rank == 0 else None
+
+    def _pressure_at_nodes(self):
+        """Multiplier at the P2 nodes: corner values, averaged on mid-edges. One value per local displacement node."""
+        corner = self.problem.pressure_field()
+        p2 = compat.cell_dofs(self.problem.displacement_space)
+        p1 = compat.cell_dofs(self.problem.pressure_space)
+        from hifi.surface import EDGES
+
+        out = np.zeros(len(self.problem.nodes))
+        out[p2[:, :4]] = corner[p1]
+        for i, (a, b) in enumerate(EDGES):
+            out[p2[:, 4 + i]] = (corner[p1[:, a]] + corner[p1[:, b]]) / 2
+        return out
+
+    def write(self, number, pressure_kPa):
+        """Write the current state as step `number` at the given pressure."""
+        fields = {
+            "displacement": self.problem.displacement()[: self._owned],
+            "pressure": self._pressure_at_nodes()[: self._owned],
+            "stretch": self.stretch.nodal()[: self._owned],
+        }
+        fields = {name: self._gather(values) for name, values in fields.items()}
+        if self.comm.rank != 0:
+            return
+        import pyvista
+
+        cells = np.hstack([np.full((len(self._cells), 1), 10), self._cells[:, TO_VTK]])
+        grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), QUADRATIC_TETRA, np.uint8), self._points)
+        for name, values in fields.items():
+            grid.point_data[name] = values.astype(np.float32)
+        name = f"step_{number:04d}.vtu"
+        with atomic_path(self.directory / name) as temporary:
+            grid.save(str(temporary))
+        self._listed.append((pressure_kPa, name))
+        rows = "".join(f'  <DataSet timestep="{p:.9g}" part="0" file="{f}"/>\n' for p, f in self._listed)
+        write_text(
+            self.directory / "solution.pvd",
+            f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n <Collection>\n{rows} </Collection>\n</VTKFile>\n',
+        )

@@ -1,0 +1,111 @@
+"""Large steps of slender bodies: extrapolation and Newton updates in section frames instead of displacements.
+
+A long inflated body rotates by many times what its walls strain, and both the extrapolation of displacements and the
+linearised rotation in a Newton step are wrong by the rotation squared. Stations along X1 carry rigid motions; what is
+extrapolated, or added, is the *relative* motion of neighbouring stations (composed exactly in SE(3)) and the position
+in the station's frame. Nodes blend the motions of their two neighbouring stations with hat functions. One station
+makes it a plain update with one rigid motion taken out; the same code serves spheres and manipulators.
+"""
+
+import numpy as np
+from mpi4py import MPI
+
+from base import se3
+from base.frames import FitMoments
+
+
+class RodCoordinates:
+    """Hat functions over stations of the undeformed x axis for the nodes (n, 3) this rank sees, `owned` of them first."""
+
+    def __init__(self, nodes, owned, comm, spacing=None):
+        self.nodes, self.owned, self.comm = nodes, owned, comm
+        x = nodes[:, 0]
+        low = comm.allreduce(x.min() if len(x) else np.inf, op=MPI.MIN)
+        high = comm.allreduce(x.max() if len(x) else -np.inf, op=MPI.MAX)
+        intervals = 0 if spacing is None else max(1, round((high - low) / spacing))
+        self.stations = intervals + 1
+        position = (x - low) / (high - low) * intervals
+        self.left = np.clip(position.astype(int), 0, max(intervals - 1, 0))
+        self.right = np.minimum(self.left + 1, intervals)
+        self.fraction = (position - self.left)[:, None] if intervals else np.zeros((len(x), 1))
+
+    def _sum_over_stations(self, rows):
+        """(stations, k) hat-weighted sums of the owned nodes' rows (n, k), over all ranks."""
+        total = np.zeros((self.stations, rows.shape[1]))
+        f = self.fraction[: self.owned]
+        for i, w in ((self.left, 1 - f), (self.right, f)):
+            for column in range(rows.shape[1]):
+                total[:, column] += np.bincount(i[: self.owned], (w * rows)[:, column], minlength=self.stations)
+        return self.comm.allreduce(total, op=MPI.SUM)
+
+    def _blend(self, values_at):
+        """Hat-weighted sum of a nodal quantity (n, 3) evaluated with the left and with the right station's data."""
+        return (1 - self.fraction) * values_at(self.left) + self.fraction * values_at(self.right)
+
+    def motions(self, positions):
+        """Rigid motions (stations, 4, 4) that carry the undeformed stations' material closest to `positions` (n, 3)."""
+        X, x = self.nodes[: self.owned], positions[: self.owned]
+        outer = np.einsum("ni,nj->nij", X, x).reshape(-1, 9)
+        sums = self._sum_over_stations(np.hstack([np.ones((len(X), 1)), X, x, outer]))
+        return np.array([FitMoments(row).pose() for row in sums])
+
+    def rotations(self, positions):
+        """Smooth nodal rotations (n, 3, 3): the stations' ones, interpolated along the geodesic between neighbours."""
+        R = self.motions(positions)[:, :3, :3]
+        between = se3.log_rotation(np.swapaxes(R[:-1], 1, 2) @ R[1:]) if self.stations > 1 else np.zeros((1, 3))
+        interval = np.minimum(self.left, len(between) - 1)
+        return R[self.left] @ se3.exp_rotation(self.fraction * between[interval])
+
+    def extrapolate(self, histories, coefficients):
+        """Positions (n, 3) extrapolated from earlier ones (m of (n, 3)) with Lagrange coefficients (m,)."""
+        motions = [self.motions(x) for x in histories]
+        # relative motion of each station with respect to the one before; the first one's to the ground
+        relative = [np.concatenate([g[:1], se3.inverse_pose(g[:-1]) @ g[1:]]) for g in motions]
+        # logs relative to the latest state stay far from pi
+        latest = relative[-1]
+        logs = [se3.log_pose(se3.inverse_pose(latest) @ h) for h in relative]
+        predicted = latest @ se3.exp_pose(sum(c * q for c, q in zip(coefficients, logs)))
+        for i in range(1, self.stations):
+            predicted[i] = predicted[i - 1] @ predicted[i]
+        inverse = [se3.inverse_pose(g) for g in motions]
+
+        def values(i):
+            local = sum(
+                c * (np.einsum("nij,nj->ni", g[i, :3, :3], x) + g[i, :3, 3]) for c, g, x in zip(coefficients, inverse, histories)
+            )
+            return np.einsum("nij,nj->ni", predicted[i, :3, :3], local) + predicted[i, :3, 3]
+
+        return self._blend(values)
+
+    def retract(self, positions, increment):
+        """Positions (n, 3) after a displacement increment (n, 3), equal to their sum to first order.
+
+        V_i: spatial twist that fits the increment best at station i. With M_i the motion of station i,
+        M_(i+1) = M_i exp(V_(i+1) - V_i): the relative motion of neighbours is integrated exactly.
+        """
+        x, d = positions[: self.owned], increment[: self.owned]
+        scale = max(np.abs(self.comm.allreduce(np.abs(positions).max(initial=0.0), op=MPI.MAX)), 1e-300)
+        x = x / scale  # conditioning of the normal equations
+        cross = np.cross(x, d)
+        outer = np.einsum("ni,nj->nij", x, x).reshape(-1, 9)
+        sums = self._sum_over_stations(np.hstack([np.ones((len(x), 1)), x, outer, d, cross]))
+        twists = np.zeros((self.stations, 6))
+        for i, row in enumerate(sums):
+            n, first, second = row[0], row[1:4], row[4:13].reshape(3, 3)
+            # minimise sum |d - t - w x x|^2 : normal equations for (w, t)
+            matrix = np.zeros((6, 6))
+            matrix[:3, :3] = np.trace(second) * np.eye(3) - second
+            matrix[:3, 3:] = se3.hat(first)
+            matrix[3:, :3] = se3.hat(first).T
+            matrix[3:, 3:] = n * np.eye(3)
+            twists[i] = np.linalg.solve(matrix, np.concatenate([row[16:19], row[13:16]]))
+        twists[:, :3] /= scale
+        steps = se3.exp_pose(np.diff(twists, axis=0, prepend=np.zeros((1, 6))))
+        for i in range(1, self.stations):
+            steps[i] = steps[i - 1] @ steps[i]
+
+        def values(i):
+            rest = increment - twists[i, 3:] - np.cross(twists[i, :3], positions)
+            return np.einsum("nij,nj->ni", steps[i, :3, :3], positions + rest) + steps[i, :3, 3]
+
+        return self._blend(values)

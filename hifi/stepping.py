@@ -1,0 +1,99 @@
+"""Adaptive load steps along an equilibrium path. Knows nothing of the physics it steps.
+
+The stepper asks its `path` object to predict and to correct at a load, and is told how many iterations that took.
+"""
+
+import time
+from dataclasses import dataclass, field
+
+from base.errors import ConvergenceError
+from hifi.solver import NotConverged
+
+
+@dataclass
+class StepSize:
+    """Growth and cut-back of the load step (FESTIM's vocabulary)."""
+
+    first: float
+    smallest: float
+    largest: float = float("inf")
+    growth_factor: float = 2.0
+    cutback_factor: float = 0.4
+    target_iterations: int = 10
+    milestones: tuple = ()
+
+
+@dataclass(frozen=True)
+class Step:
+    """One accepted step."""
+
+    number: int
+    load: float
+    iterations: int
+    factorisations: int
+    residual: float
+    seconds: float
+
+
+@dataclass
+class StepResult:
+    """Accepted steps, number of failed attempts, and why it ended."""
+
+    steps: list = field(default_factory=list)
+    failures: list = field(default_factory=list)
+    finished: bool = False
+    reason: str = ""
+
+
+def lagrange_coefficients(known, wanted):
+    """Weights (m,) of values at loads `known` (m,) that extrapolate them to `wanted`."""
+    weights = []
+    for i, a in enumerate(known):
+        w = 1.0
+        for j, b in enumerate(known):
+            if i != j:
+                w *= (wanted - b) / (a - b)
+        weights.append(w)
+    return weights
+
+
+def run_steps(path, target, size, on_step=lambda step: None):
+    """Drive `path` from its current load to `target`; return a StepResult with finished=True.
+
+    path.load, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
+    its last accepted state. `on_step(step)` is called after each accepted step (hooks write results there). Raises
+    ConvergenceError, with the StepResult as its `result`, when steps fall below size.smallest.
+    """
+    result = StepResult()
+    milestones = sorted({m for m in size.milestones if path.load < m < target} | {target})
+    step, started = size.first, time.perf_counter()
+    while milestones:
+        remaining = milestones[0] - path.load
+        # hit the milestone exactly, and never leave a sliver of a step before it
+        load = milestones[0] if step > 0.999 * remaining else path.load + (step if step < 0.6 * remaining else remaining / 2)
+        attempted = load - path.load
+        try:
+            iterations, factorisations, residual = path.advance(load)
+        except NotConverged as error:
+            result.failures.append((load, str(error)))
+            step = attempted * size.cutback_factor
+            if step < size.smallest:
+                result.reason = str(error)
+                failure = ConvergenceError(
+                    f"stopped at load {path.load:.6g}: the next step of {attempted:.2g} did not converge ({error}); "
+                    "results up to there are kept. A limit point (ballooning), touching walls or a coarse mesh are the usual causes"
+                )
+                failure.result = result
+                raise failure from None
+            continue
+        accepted = Step(len(result.steps) + 1, load, iterations, factorisations, residual, time.perf_counter() - started)
+        result.steps.append(accepted)
+        if load == milestones[0]:
+            milestones.pop(0)
+        if iterations <= size.target_iterations:
+            step = min(max(step, attempted) * size.growth_factor, size.largest)
+        elif iterations > 2 * size.target_iterations:
+            step = max(attempted * 0.7, size.smallest)
+        on_step(accepted)
+    result.finished = True
+    return result

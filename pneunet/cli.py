@@ -1,0 +1,171 @@
+"""The command line: each link of the chain is a sub-command, and an importable function behind it.
+
+Exit codes: 0 done; 2 bad input or a load that could not be reached (one line on standard error, under MPI from one
+rank); anything else is a bug and shows its traceback.
+"""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from base.errors import ConvergenceError, InputError
+
+MPI_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        raise InputError(f"{self.prog}: {message}")
+
+
+def pressures(text):
+    """MPa values of a comma-separated list of kPa."""
+    values = []
+    for word in text.split(","):
+        try:
+            value = float(word)
+        except ValueError:
+            raise InputError(f"--pressure-kPa: '{word}' is not a number; write for instance 10,20,30") from None
+        if not 0 < value <= 2000:
+            raise InputError(f"--pressure-kPa: {value:g} must lie in 0..2000 kPa")
+        values.append(value * 1e-3)
+    return values
+
+
+def one_pressure(text):
+    values = pressures(text)
+    if len(values) != 1:
+        raise InputError("--pressure-kPa: one number is wanted here")
+    return values[0]
+
+
+def mesh_size(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.1 <= value <= 20:
+        raise InputError(f"--mesh-size-mm: '{text}' must be a number in 0.1..20")
+    return value
+
+
+def parser():
+    top = Parser(prog="pneunet", description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+
+    def add(name, function, text):
+        command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(function=function)
+        return command
+
+    c = add("design", run_design, "inverse design: target curve (CSV or TOML) -> design.toml, centreline.csv, design.png")
+    c.add_argument("target", type=Path)
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the target")
+
+    c = add("shape", run_shape, "reduced model only: centrelines, 3D body, picture and animation")
+    c.add_argument("design", type=Path)
+    c.add_argument("--pressure-kPa", type=pressures, dest="pressures", metavar="10,20,...", help="default: five steps to the design's")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
+
+    c = add("mesh", run_mesh, "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
+    c.add_argument("design", type=Path)
+    c.add_argument("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
+
+    c = add("solve", run_solve, "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml")
+    c.add_argument("design", type=Path)
+    c.add_argument("--pressure-kPa", type=one_pressure, dest="pressure", help="default: the design's")
+    c.add_argument("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    c.add_argument("--no-fields", action="store_true", help="write no ParaView files")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
+
+    c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
+    c.add_argument("directory", type=Path)
+
+    c = add("run", run_ranks, "start a pneunet command (or, after --, any program) on N MPI ranks")
+    c.add_argument("-n", "--ranks", type=int, required=True)
+    c.add_argument("rest", nargs=argparse.REMAINDER, metavar="COMMAND ...")
+
+    add("doctor", run_doctor, "check this installation and say what to fix")
+    return top
+
+
+def say(text):
+    print(text, flush=True)
+
+
+def design_folder(arguments):
+    return arguments.output or arguments.design.parent
+
+
+def run_design(a):
+    from design.run import run_design as work
+
+    work(a.target, a.output or Path("out") / a.target.stem, say=say)
+
+
+def run_shape(a):
+    from design.shape import run_shape as work
+    from geometry.designfile import read_design
+
+    top = read_design(a.design).pressure
+    work(a.design, a.pressures or [top * i / 5 for i in range(1, 6)], design_folder(a), say=say)
+
+
+def run_mesh(a):
+    from base.files import output_directory
+    from geometry.designfile import read_design
+    from geometry.mesh import mesh_manipulator
+
+    design = read_design(a.design)
+    folder = output_directory(design_folder(a)) / "mesh"
+    mesh_manipulator(design.manipulator, a.mesh_size_mm or design.mesh_size, folder, say)
+    say(f"written: {folder / 'manipulator.msh'}, manipulator.step, mesh.json")
+
+
+def run_solve(a):
+    from geometry.designfile import read_design
+
+    design = read_design(a.design)
+    from hifi.manipulator import solve_design
+
+    last = solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say)
+    if last.walls is not None:
+        say(f"done: {last.pressure * 1e3:g} kPa; results in {design_folder(a) / 'solve'}")
+
+
+def run_report(a):
+    from design.report import write_report
+
+    say(f"report: {write_report(a.directory, say=say)}")
+
+
+def run_ranks(a):
+    from pneunet import launch
+
+    if a.ranks < 1:
+        raise InputError(f"-n {a.ranks}: at least 1 rank is needed")
+    if not a.rest:
+        raise InputError("run: no command given; write for instance: pneunet run -n 2 solve DESIGN.toml")
+    return launch.run(a.ranks, a.rest)
+
+
+def run_doctor(a):
+    from pneunet import doctor
+
+    return doctor.main()
+
+
+def main(arguments=None):
+    """Entry point; returns the exit code."""
+    try:
+        a = parser().parse_args(arguments)
+        return a.function(a) or 0
+    except (InputError, ConvergenceError) as error:
+        # every rank fails alike; one of them says so
+        if all(os.environ.get(name, "0") == "0" for name in MPI_RANK_VARIABLES):
+            print(f"pneunet: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130

@@ -1,0 +1,83 @@
+"""Start a command on several MPI ranks: `pneunet run -n N ...`.
+
+Open MPI refuses to run as root and to run more ranks than it counts cores, and its versions 4 and 5
+read different variables to be told otherwise. Here they are all told, whichever is installed.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+# Variables of Open MPI 4 (OMPI_...) and 5 (PRTE_... for its launcher). A value the user has set wins.
+SETTINGS = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "PRTE_ALLOW_RUN_AS_ROOT": "1",
+    "PRTE_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    # more ranks than cores
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":OVERSUBSCRIBE",
+    # no pinning to cores: two runs at once, or a container's cpuset, would share the same few
+    "OMPI_MCA_hwloc_base_binding_policy": "none",
+    "PRTE_MCA_hwloc_default_binding_policy": "none",
+    # containers may forbid to read another process's memory; version 5 finds that out by itself
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
+    # one machine: shared memory is enough, and a container may have no network
+    "OMPI_MCA_btl": "^tcp",
+    # a command that ends with an error has said why itself; no page about it from mpirun (5 cannot be told)
+    "OMPI_MCA_orte_execute_quiet": "1",
+    # one thread a rank, and no remarks on the machine's topology
+    "OMP_NUM_THREADS": "1",
+    "HWLOC_HIDE_ERRORS": "2",
+}
+
+
+def environment() -> dict[str, str]:
+    """The environment for mpirun: ours, the settings above, this Python's programs first on PATH."""
+    env = dict(os.environ)
+    if "PMIX_RANK" in env:  # started by an mpirun ourselves: its marks would confuse the new one
+        env = {k: v for k, v in env.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
+    env = SETTINGS | env
+    env["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), env.get("PATH", os.defpath)])
+    return env
+
+
+def command_line(ranks: int, command: list[str]) -> list[str]:
+    """The mpirun line. A command that starts with "--" is any program, else a sub-command of pneunet."""
+    if ranks < 1:
+        raise ValueError(f"the number of ranks must be at least 1, not {ranks}")
+    program = command[1:] if command[:1] == ["--"] else [str(Path(sys.executable).with_name("pneunet")), *command]
+    if not program or not command:
+        raise ValueError("no command to run: pneunet run -n 2 solve DESIGN.toml, or pneunet run -n 2 -- PROGRAM ...")
+    return ["mpirun", "-n", str(ranks), *program]
+
+
+def run(ranks: int, command: list[str]) -> int:
+    """Run `command` on `ranks` ranks, with our standard streams; returns its exit code."""
+    try:
+        line = command_line(ranks, command)
+    except ValueError as error:
+        print(f"pneunet run: {error}", file=sys.stderr)
+        return 2
+    env = environment()
+    for needed in ("mpirun", line[3]):
+        if shutil.which(needed, path=env["PATH"]) is None:
+            print(f"pneunet run: {needed} not found (make setup; pneunet doctor tells more)", file=sys.stderr)
+            return 127
+    with subprocess.Popen(line, env=env) as process:
+        # Told to end, we tell mpirun, so that no rank is left behind.
+        previous = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
+        try:
+            code = process.wait()
+        except KeyboardInterrupt:  # mpirun got it too, from the terminal
+            code = process.wait() or 130
+        finally:
+            signal.signal(signal.SIGTERM, previous)
+    code = code if code >= 0 else 128 - code
+    if 128 < code < 160:  # said here, since mpirun is told to be quiet
+        why = " (out of memory?)" if code == 137 else ""
+        print(f"pneunet run: a rank was stopped by signal {code - 128}{why}", file=sys.stderr)
+    return code

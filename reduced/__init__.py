@@ -1,0 +1,6 @@
+"""What is fast: rod kinematics and the analytic laws that predict a manipulator's shape. numpy and scipy alone."""
+
+from reduced.model import AnalyticModel, SegmentLaw, predict
+from reduced.rod import Centreline, centreline
+
+__all__ = ["AnalyticModel", "Centreline", "SegmentLaw", "centreline", "predict"]

@@ -1,0 +1,199 @@
+"""The twisting tube: the paper's Sec. II.A (Eqs 1-21) in a consistent form.
+
+A tube of isotropic neo-Hookean matrix and one family of fibres along the chambers, capped and inflated:
+  r^2 = ri^2 + (R^2 - Ri^2)/lambda,  psi = Psi + k Z,  z = lambda Z,   k = tau lambda,
+  W = c1 mu/2 (I1 - 3) + c2 E_t/2 (sqrt(I4) - 1)^2.                                       (paper, Eqs 2-4)
+The three balances of Eqs 19-21 (radial equilibrium, capped ends, no torque) are the stationarity of
+  Pi(ri, lambda, k) = 2 pi int W R dR - P pi (ri^2 lambda - Ri^2)
+per undeformed length. `printed_equations` is the paper's own form, which has no solution.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from base.errors import InputError
+from reduced.equilibrium import follow
+
+#: Components of the fibre A(angle) on the axis Z and the hoop Psi. `axial`: the text below Eq. 3, angle measured from
+#: the axis, which is what a chamber does; `hoop`: Eqs 11-12, cos on the hoop direction.
+FIBRE_CONVENTIONS = {"axial": (np.cos, np.sin), "hoop": (np.sin, np.cos)}
+
+#: The paper's constants for its twisting theory: Eq. 2, below Eq. 1, Sec. III.
+PAPER_MU, PAPER_FIBRE_MODULUS, PAPER_ISOTROPIC_FRACTION, PAPER_ANISOTROPIC_FRACTION = 0.317, 0.008, 0.27, 0.73
+
+GAUSS_POINTS = 12
+
+
+@dataclass(frozen=True)
+class TwistingTube:
+    """inner_radius, outer_radius: Ri, Ro in mm; mu: matrix shear modulus, MPa; fibre_modulus: E_t, MPa; fractions c1, c2.
+
+    fibre_convention: 'axial' (A = (cos, sin) on (Z, Psi)) or 'hoop' (A = (sin, cos)).
+    """
+
+    inner_radius: float
+    outer_radius: float
+    mu: float
+    fibre_modulus: float
+    isotropic_fraction: float = PAPER_ISOTROPIC_FRACTION
+    anisotropic_fraction: float = PAPER_ANISOTROPIC_FRACTION
+    fibre_convention: str = "axial"
+
+    def __post_init__(self):
+        if not 0 < self.inner_radius < self.outer_radius:
+            raise InputError(f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius = {self.outer_radius:g} mm")
+        for name in ("mu", "fibre_modulus", "isotropic_fraction", "anisotropic_fraction"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} = {getattr(self, name):g} must be larger than 0")
+        if self.fibre_convention not in FIBRE_CONVENTIONS:
+            raise InputError(f"fibre_convention = '{self.fibre_convention}' is not known: write 'axial' or 'hoop'")
+
+    def solve(self, angle, pressure):
+        """Deformed inner radius ri (mm), stretch lambda_z and tau (rad per mm of deformed length), each shaped as pressure.
+
+        angle in degrees; pressure in MPa, a number or an array. ConvergenceError beyond the limit load.
+        """
+        pressure = np.asarray(pressure, float)
+        if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
+            raise InputError("pressure: give finite values >= 0 in MPa")
+        levels, where = np.unique(pressure, return_inverse=True)
+        x = follow(TubePotential(self, angle), levels)[where.ravel()]
+        ri, stretch = self.inner_radius * x[:, 0], x[:, 1]
+        tau = x[:, 2] / (self.outer_radius * stretch)
+        return tuple(a.reshape(pressure.shape) if pressure.ndim else float(a[0]) for a in (ri, stretch, tau))
+
+
+class TubePotential:
+    """Energy and cavity volume per undeformed length; unknowns x = (ri/Ri, lambda, k Ro)."""
+
+    name = "twisting tube"
+    start = np.array([1.0, 1.0, 0.0])
+
+    def __init__(self, tube, angle):
+        self.tube = tube
+        on_axis, on_hoop = FIBRE_CONVENTIONS[tube.fibre_convention]
+        self.axial, self.hoop = on_axis(np.radians(angle)), on_hoop(np.radians(angle))
+        Ri, Ro = tube.inner_radius, tube.outer_radius
+        points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+        self.R = (Ro + Ri) / 2 + (Ro - Ri) / 2 * points
+        self.weights = np.pi * (Ro - Ri) * weights * self.R
+        self.scale = tube.mu * np.pi * (Ro**2 - Ri**2)
+
+    def admissible(self, x):
+        return x[0] > 0.1 and x[1] > 0.1
+
+    def volume(self, x):
+        a, l, _ = x
+        c = np.pi * self.tube.inner_radius**2
+        return c * a * a * l, c * np.array([2 * a * l, a * a, 0]), c * np.array([[2 * l, 2 * a, 0], [2 * a, 0, 0], [0, 0, 0]])
+
+    def energy(self, x):
+        """Value, gradient (3,), Hessian (3, 3). I1 and I4 are rational in (rho = r^2, lambda, k), and rho in (a, lambda)."""
+        t, R2 = self.tube, self.R**2
+        Ri2, Ro = t.inner_radius**2, t.outer_radius
+        a, l, k = x[0], x[1], x[2] / Ro
+        b = R2 - Ri2
+        rho = Ri2 * a * a + b / l
+        one, zero = np.ones_like(R2), np.zeros_like(R2)
+        # derivatives of rho by (a, lambda, k)
+        d_rho = np.array([2 * Ri2 * a * one, -b / l**2, zero])
+        dd_rho = np.zeros((3, 3) + R2.shape)
+        dd_rho[0, 0], dd_rho[1, 1] = 2 * Ri2, 2 * b / l**3
+        # I1 and I4 by q = (rho, lambda, k), then by x: q depends on x through rho alone
+        to_q = np.array([d_rho, [zero, one, zero], [zero, zero, one]])
+        radial = R2 / (rho * l * l)
+        I1 = radial + rho / R2 + rho * k * k + l * l
+        g1 = np.array([-radial / rho + 1 / R2 + k * k, -2 * radial / l + 2 * l, 2 * rho * k])
+        h1 = np.array(
+            [
+                [2 * radial / rho**2, 2 * radial / (rho * l), 2 * k * one],
+                [2 * radial / (rho * l), 6 * radial / l**2 + 2, zero],
+                [2 * k * one, zero, 2 * rho],
+            ]
+        )
+        # fibre: I4 = rho (hoop/R + k axial)^2 + (lambda axial)^2
+        s, c = self.hoop / self.R, self.axial
+        m = s + k * c
+        I4 = rho * m * m + (l * c) ** 2
+        g4 = np.array([m * m, 2 * l * c * c * one, 2 * rho * m * c])
+        h4 = np.array([[zero, zero, 2 * m * c], [zero, 2 * c * c * one, zero], [2 * m * c, zero, 2 * rho * c * c]])
+        root = np.sqrt(I4)
+        iso, fibre = t.isotropic_fraction * t.mu / 2, t.anisotropic_fraction * t.fibre_modulus / 2
+        # W = iso (I1 - 3) + fibre (root - 1)^2; dW/dI4 = fibre (1 - 1/root), d2W/dI4^2 = fibre/(2 root^3)
+        w4, w44 = fibre * (1 - 1 / root), fibre / (2 * root**3)
+        gq = iso * g1 + w4 * g4
+        hq = iso * h1 + w4 * h4 + w44 * g4[:, None] * g4[None]
+        value = self.weights @ (iso * (I1 - 3) + fibre * (root - 1) ** 2)
+        gradient = np.einsum("ain,an,n->i", to_q, gq, self.weights)
+        hessian = np.einsum("ain,abn,bjn,n->ij", to_q, hq, to_q, self.weights) + dd_rho @ (gq[0] * self.weights)
+        unit = np.array([1, 1, 1 / Ro])
+        return value, gradient * unit, hessian * unit * unit[:, None]
+
+
+@dataclass(frozen=True)
+class PrintedResult:
+    """Best attempt at the paper's printed equations: residuals of Eqs 19, 20, 21 relative to P, P pi Ri^2, P pi Ri^3."""
+
+    solved: bool
+    unknowns: dict
+    residual: np.ndarray
+    starts: int
+
+    def __str__(self):
+        state = ", ".join(f"{k} = {v:.4g}" for k, v in self.unknowns.items())
+        head = "solution" if self.solved else f"no solution in the physical range ({self.starts} starts); least residual"
+        return f"{head}: |residual| = {np.linalg.norm(self.residual):.3g} at {state}"
+
+
+def printed_residual(tube, angle, pressure, tau, stretch, multiplier):
+    """Eqs 19-21 as printed (3,): uniform lambda_psi = lambda_z^-1/2, Eq. 11 without c1 mu lambda_psi^2, cos on the hoop.
+
+    `multiplier` stands where Eqs 10-12 print P.
+    """
+    hoop_stretch = stretch**-0.5
+    ri, ro = tube.inner_radius * hoop_stretch, tube.outer_radius * hoop_stretch
+    points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    r, w = (ro + ri) / 2 + (ro - ri) / 2 * points, (ro - ri) / 2 * weights
+    c1mu, c2E = tube.isotropic_fraction * tube.mu, tube.anisotropic_fraction * tube.fibre_modulus
+    sin, cos = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+    shear = tau * r * stretch
+    along = hoop_stretch * cos + shear * sin
+    fibre = c2E * (1 - 1 / np.sqrt(along**2 + (stretch * sin) ** 2))
+    s_rr = -multiplier + c1mu / (stretch * hoop_stretch) ** 2
+    s_pp = -multiplier + c1mu * shear**2 + fibre * along**2
+    s_zz = -multiplier + c1mu * stretch**2 + fibre * (stretch * sin) ** 2
+    s_pz = stretch * (c1mu * shear + fibre * sin * along)
+    Ri, thrust = tube.inner_radius, pressure * np.pi * tube.inner_radius**2
+    return np.array(
+        [
+            (w @ ((s_pp - s_rr) / r) - pressure) / pressure,
+            (2 * np.pi * w @ (s_zz * r) - pressure * np.pi * ri**2) / thrust,
+            2 * np.pi * w @ (s_pz * r**2) / (thrust * Ri),
+        ]
+    )
+
+
+def printed_equations(tube, angle, pressure, multiplier="unknown", seed=0):
+    """Try to solve the paper's printed Eqs 5-21 and report; pressure > 0 in MPa, angle in degrees.
+
+    multiplier: 'unknown' takes the letter P in Eqs 10-12 for the constant multiplier p, one of the paper's three
+    unknowns; 'pressure' takes it literally. Least squares from many starting points over the physical range
+    (|tau| <= 0.2 rad/mm, 0.5 <= lambda <= 2.5, |p| <= 2 MPa).
+    """
+    low, high = np.array([-0.2, 0.5, -2.0]), np.array([0.2, 2.5, 2.0])
+    free = 3 if multiplier == "unknown" else 2
+    starts = low[:free] + (high - low)[:free] * np.random.default_rng(seed).random((60, free))
+
+    def residual(x):
+        return printed_residual(tube, angle, pressure, x[0], x[1], x[2] if free == 3 else pressure)
+
+    fits = [
+        least_squares(residual, x, bounds=(low[:free], high[:free]), x_scale=(high - low)[:free], xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        for x in starts
+    ]
+    best = min(fits, key=lambda fit: fit.cost)
+    names = ("tau", "lambda_z", "p")[:free]
+    solved = bool(np.linalg.norm(best.fun) < 1e-8)
+    return PrintedResult(solved, dict(zip(names, best.x.tolist())), best.fun, len(starts))

@@ -1,0 +1,94 @@
+"""A run directory as the commands leave it, small and consistent: the "finite elements" are the reduced model with every
+strain (departure from rest) times `FACTOR`, so the report's numbers can be foreseen."""
+
+import json
+
+import numpy as np
+
+from base.files import write_csv
+from base.strains import RodStrains
+from geometry.designfile import Design, write_design
+from geometry.parameters import Manipulator, Segment
+from reduced.model import AnalyticModel, predict
+from reduced.rod import centreline
+
+FACTOR = 0.8
+POSE = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, -3.0], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
+TWIST = Segment("twisting", 60.0, 4, chamber_height=5.5, gap=2.0, cavity_floor=0.5)
+HELIX = Segment("one-sided", 60.0, 9, gap=1.5)
+PLANE = Segment("one-sided", 90.0, 4, gap=1.5)
+
+
+def scaled_strains(manipulator, pressure, model):
+    """(pieces, segments): RodStrains of the pieces in a row and of the segments, FACTOR times the model's."""
+    rest = RodStrains.unstrained()
+    each = [model.strains(s, pressure) for s in manipulator.segments]
+    each = [RodStrains(rest.e + FACTOR * (s.e - rest.e), FACTOR * s.k) for s in each]
+    pieces = [rest if i is None else each[i] for i, _ in manipulator.pieces]
+    return tuple(RodStrains([s.e for s in group], [s.k for s in group]) for group in (pieces, each))
+
+
+def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, solve=True, fields=True):
+    """Fill `directory`; the solve ends at `reached` times the design pressure (MPa), one gap overlaps by `overlap` mm."""
+    manipulator, model = Manipulator(segments), AnalyticModel()
+    design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
+    directory.mkdir(parents=True, exist_ok=True)
+    write_design(directory / "design.toml", design)
+    line = predict(manipulator, pressure, model, base_pose=POSE)
+    wave = np.column_stack([np.zeros_like(line.s), np.zeros_like(line.s), 1.5 * (1 - np.cos(line.s / 20.0))])
+    write_csv(directory / "target.csv", ["x_mm", "y_mm", "z_mm"], line.points + wave)
+    write_csv(directory / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"], np.column_stack([line.s, line.points]))
+    (directory / "run.json").write_text(json.dumps({"command": "pneunet design target.csv", "revision": "abc"}))
+    if not solve:
+        return design
+    (directory / "mesh").mkdir(exist_ok=True)
+    (directory / "mesh" / "mesh.json").write_text(json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}}))
+    _solve(directory / "solve", design, model, reached, overlap, fields)
+    return design
+
+
+def _solve(folder, design, model, reached, overlap, fields):
+    folder.mkdir(exist_ok=True)
+    manipulator = design.manipulator
+    steps, centrelines, segments = [], [], []
+    lengths = [length for _, length in manipulator.pieces]
+    for n, p in enumerate(design.pressure * reached * np.array([0.25, 0.5, 0.75, 1.0]), start=1):
+        pieces, each = scaled_strains(manipulator, p, model)
+        line = centreline(lengths, pieces, spacing=3.0)
+        steps.append([n, p * 1e3, 4, 2, 900 + 4e3 * p, *line.points[-1], 1.5 - 60 * p, 1 + 5 * p, 1.5])
+        centrelines += [[n, p * 1e3, s, *point] for s, point in zip(line.s, line.points)]
+        segments += [[n, p * 1e3, i + 1, *each.e[i], *each.k[i]] for i in range(len(manipulator.segments))]
+    write_csv(folder / "steps.csv", ["step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm",
+                                     "tip_z_mm", "smallest_wall_distance_mm", "largest_stretch", "seconds"], steps)
+    write_csv(folder / "centrelines.csv", ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"], centrelines)
+    write_csv(folder / "segments.csv", ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"], segments)
+    walls = [[i + 1, side, gap, s.gap * (0.4 + 0.5 * gap / s.chambers)]
+             for i, s in enumerate(manipulator.segments) for side in s.sides for gap in range(1, s.chambers)]
+    if overlap:
+        walls[0][3] = -overlap
+    write_csv(folder / "walls.csv", ["segment", "side", "gap", "distance_mm"], walls)
+    (folder / "run.json").write_text(json.dumps({"command": "mpirun -n 2 pneunet solve design.toml", "ranks": 2, "dofs": 12345,
+                                                 "versions": {"dolfinx": "0.5.2"}, "status": "reached", "steps": [[1], [2]]}))
+    if fields:
+        _fields(folder, manipulator, line)
+
+
+def _fields(folder, manipulator, line):
+    """solution.pvd with one .vtu: hexahedra of a bar, displaced by the line's section frames."""
+    import pyvista
+
+    s0 = manipulator.segments[0]
+    x = np.linspace(0, manipulator.length, 60)
+    grid = pyvista.RectilinearGrid(x, np.linspace(-s0.width / 2, s0.width / 2, 5), np.linspace(-2, 4, 4)).cast_to_unstructured_grid()
+    rest = np.asarray(grid.points, float)
+    poses = line.at(np.clip(rest[:, 0], 0, line.s[-1]))
+    local = rest * [0, 1, 1]
+    moved = np.einsum("nij,nj->ni", poses[:, :3, :3], local) + poses[:, :3, 3]
+    grid.point_data["displacement"] = moved - rest
+    grid.point_data["stretch"] = 1 + 0.1 * np.abs(rest[:, 2])
+    grid.point_data["pressure"] = np.zeros(grid.n_points)
+    grid.save(folder / "solution_0.vtu")
+    (folder / "solution.pvd").write_text(
+        '<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>'
+        '<DataSet timestep="20" part="0" file="solution_0.vtu"/></Collection></VTKFile>'
+    )

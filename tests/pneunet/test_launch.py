@@ -1,0 +1,96 @@
+"""`pneunet run`: ranks, arguments, streams and exit codes, as a user sees them."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from pneunet import launch
+
+SIZE = "from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)"
+
+
+def run(ranks, *command, **options):
+    """launch.run in a process of its own, since it hands its standard streams on."""
+    code = f"import sys; from pneunet import launch; sys.exit(launch.run({ranks}, sys.argv[1:]))"
+    return subprocess.run(
+        [sys.executable, "-c", code, *command], capture_output=True, text=True, timeout=120, **options
+    )
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 5])
+def test_ranks_find_each_other_also_more_than_cores(ranks):
+    done = run(ranks, "--", "python", "-c", SIZE)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [str(ranks), str(ranks * (ranks - 1) // 2)]
+
+
+def test_arguments_with_spaces_and_input_reach_the_program():
+    code = "import sys; print(repr(sys.argv[1]), sys.stdin.read())"
+    done = run(1, "--", "python", "-c", code, "a  b; 'c'", input="from stdin")
+    assert done.stdout.strip() == repr("a  b; 'c'") + " from stdin"
+
+
+def test_exit_code_of_the_program_is_handed_on():
+    assert run(2, "--", "python", "-c", "raise SystemExit(3)").returncode == 3
+
+
+def test_killed_rank_is_reported():
+    done = run(2, "--", "python", "-c", "import os; os.kill(os.getpid(), 9)")
+    assert done.returncode == 137
+    assert "signal 9" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("ranks", "command", "message"),
+    [
+        (0, ["--", "true"], "at least 1"),
+        (2, [], "no command"),
+        (2, ["--"], "no command"),
+        (2, ["--", "no-such-program"], "no-such-program not found"),
+    ],
+)
+def test_mistakes_get_one_line(ranks, command, message):
+    done = run(ranks, *command)
+    assert done.returncode in (2, 127)
+    assert message in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_without_dashes_it_is_a_subcommand_of_pneunet():
+    line = launch.command_line(4, ["solve", "design.toml"])
+    assert line[:3] == ["mpirun", "-n", "4"]
+    assert line[3].endswith("/pneunet") and line[4:] == ["solve", "design.toml"]
+
+
+def test_started_from_within_an_mpi_rank():
+    inner = f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {SIZE!r}]))"
+    outer = (
+        f"import subprocess, sys; from mpi4py import MPI; subprocess.run([sys.executable, '-c', {inner!r}], check=True)"
+    )
+    done = run(1, "--", "python", "-c", outer)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["2", "1"]
+
+
+def test_one_thread_a_rank_unless_the_user_says_otherwise(monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    assert launch.environment()["OMP_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    assert launch.environment()["OMP_NUM_THREADS"] == "4"
+
+
+def test_terminating_it_leaves_no_ranks_behind(tmp_path):
+    beat = tmp_path / "beat"
+    ranks = f"import time\nwhile True: open({str(beat)!r}, 'a').write('x'); time.sleep(0.05)"
+    code = f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {ranks!r}]))"
+    process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not beat.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.terminate()
+    assert process.wait(timeout=60) != 0
+    time.sleep(0.5)
+    size = beat.stat().st_size
+    time.sleep(0.5)
+    assert beat.stat().st_size == size > 0
