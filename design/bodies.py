@@ -48,12 +48,15 @@ def render(view, things, pixels=PIXELS):
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     plotter = pyvista.Plotter(off_screen=True, window_size=list(pixels))
     plotter.set_background("white")
+    towards = np.cross(view.right, view.up)
     for mesh, keywords in things:
+        if mesh.n_lines:  # in front of the faces they lie on
+            mesh = mesh.translate(0.15 * towards)
         plotter.add_mesh(mesh, **{"show_scalar_bar": False, "ambient": 0.35, "diffuse": 0.75, **keywords})
     plotter.enable_parallel_projection()
     distance = 20 * view.half_height
     plotter.camera.focal_point = view.focus
-    plotter.camera.position = view.focus + distance * np.cross(view.right, view.up)
+    plotter.camera.position = view.focus + distance * towards
     plotter.camera.up = view.up
     plotter.camera.parallel_scale = view.half_height
     plotter.camera.clipping_range = (0.1 * distance, 2 * distance)
@@ -73,12 +76,12 @@ def tube(points, radius=0.9, colour=TARGET):
 def body_mesh(manipulator, pressure, model, base_pose):
     """The reduced model's body (pyvista.PolyData, mm, target coordinates), cell data "segment" 1.. ."""
     import pyvista
+
     from reduced.body import body_surface
 
-    vertices, quads, segments = body_surface(manipulator, pressure, model)
-    faces = np.column_stack([np.full(len(quads), 4), quads])
-    mesh = pyvista.PolyData(se3.transform(base_pose, vertices), faces.ravel())
-    mesh.cell_data["segment"] = np.asarray(segments) + 1
+    vertices, quads, segments = body_surface(manipulator, pressure, model, base_pose=base_pose)
+    mesh = pyvista.PolyData(vertices, np.column_stack([np.full(len(quads), 4), quads]).ravel())
+    mesh.cell_data["segment"] = segments + 1
     return mesh
 
 
@@ -93,9 +96,9 @@ def painted(mesh):
 
 
 def edges(mesh, angle=35):
-    """Sharp edges of a surface as thin dark lines."""
-    found = mesh.extract_feature_edges(feature_angle=angle, boundary_edges=False, non_manifold_edges=False)
-    return found, {"color": "#3b434b", "line_width": 1.0, "lighting": False}
+    """Sharp edges and rims of a surface as thin dark lines."""
+    found = mesh.extract_feature_edges(feature_angle=angle, boundary_edges=True, non_manifold_edges=False)
+    return found, {"color": "#3b434b", "line_width": 1.5, "lighting": False}
 
 
 def read_solution(path):
@@ -113,10 +116,10 @@ def deformed_surface(grid, base_pose):
     surface = grid.extract_surface(nonlinear_subdivision=1)
     surface.point_data["displacement length"] = np.linalg.norm(surface.point_data["displacement"], axis=1)
     # the edges of the undeformed shape, carried along: a bent wall gets none
-    lines = surface.extract_feature_edges(feature_angle=35, boundary_edges=False, non_manifold_edges=False)
+    lines, look = edges(surface)
     for mesh in (surface, lines):
         mesh.points = se3.transform(base_pose, mesh.points + mesh.point_data["displacement"])
-    return surface, (lines, {"color": "#3b434b", "line_width": 1.0, "lighting": False})
+    return surface, (lines, look)
 
 
 def coloured(surface, name, limits, cmap):
@@ -127,19 +130,10 @@ def coloured(surface, name, limits, cmap):
 def write_picture(path, view, image, title, bar=None):
     """PNG of a rendered image with a title, a scale in mm, the directions of the axes and, when `bar` = (label,
     limits, cmap) is given, a colour bar."""
-    fig = body_figure(view, image, title, bar)
-    save(fig, path, dpi=100)
-
-
-def body_figure(view, image, title, bar=None):
     height = 5.95 + (0.85 if bar else 0.0)
     fig = figure(7.0, height)
     picture = 5.6 / height
-    ax = fig.add_axes([0, 1 - picture - 0.35 / height, 1, picture])
-    ax.imshow(image)
-    ax.set_axis_off()
-    _scale_bar(ax, view)
-    _triad(ax, view)
+    show(fig.add_axes([0, 1 - picture - 0.35 / height, 1, picture]), view, image)
     fig.text(0.02, 1 - 0.09 / height, title, fontsize=15, weight="bold", va="top")
     if bar:
         from matplotlib.cm import ScalarMappable
@@ -150,7 +144,15 @@ def body_figure(view, image, title, bar=None):
         fig.colorbar(ScalarMappable(Normalize(*limits), cmap), cax=cax, orientation="horizontal")
         cax.set_xlabel(label, fontsize=13)
         cax.tick_params(labelsize=12)
-    return fig
+    save(fig, path, dpi=100)
+
+
+def show(ax, view, image):
+    """A rendered image in matplotlib axes, with scale and directions."""
+    ax.imshow(image)
+    ax.set_axis_off()
+    _scale_bar(ax, view)
+    _triad(ax, view)
 
 
 def _scale_bar(ax, view):
@@ -170,5 +172,10 @@ def _triad(ax, view):
         step = length * np.array([view.right[i], -view.up[i]])
         if np.linalg.norm(step) < 0.15 * length:
             continue
-        ax.annotate("", xy=origin + step, xytext=origin, arrowprops={"arrowstyle": "-|>", "color": "#30363d", "linewidth": 1.2, "shrinkA": 0, "shrinkB": 0})
+        ax.annotate(
+            "",
+            xy=origin + step,
+            xytext=origin,
+            arrowprops={"arrowstyle": "-|>", "color": "#30363d", "linewidth": 1.2, "shrinkA": 0, "shrinkB": 0},
+        )
         ax.text(*(origin + step * (1 + 16 / np.linalg.norm(step))), name, ha="center", va="center", fontsize=13)

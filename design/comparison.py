@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from base import se3
 from base.errors import ConvergenceError
@@ -45,7 +46,7 @@ class Comparison:
                     "the design was edited, or predicted by another model; this report re-evaluates the analytic model."
                 )
         if run.solve is not None:
-            solved = se3.transform(design.base_pose, run.solve.points)
+            solved = se3.transform(design.base_pose, smooth(run.solve.s, run.solve.points))
             if stopped_short(run):
                 notes.append(
                     f"The finite element solution stops at {plain(run.solve.pressure * 1e3)} kPa, below the design pressure of "
@@ -57,9 +58,22 @@ class Comparison:
                 each = [model.strains(s, run.solve.pressure) for s in design.manipulator.segments]
                 strains = RodStrains([s.e for s in each], [s.k for s in each])
         return cls(
-            reduced, at_solve, strains, solved,
-            _errors(reduced, run.target), _errors(solved, run.target), _errors(at_solve, solved), tuple(dict.fromkeys(notes)),
+            reduced,
+            at_solve,
+            strains,
+            solved,
+            _errors(reduced, run.target),
+            _errors(solved, run.target),
+            _errors(at_solve, solved),
+            tuple(dict.fromkeys(notes)),
         )
+
+
+def smooth(s, points, spacing=1.0):
+    """Points (m, 3) about `spacing` mm apart on the cubic spline through section origins (n, 3) at s (n,) mm: the
+    stations of the finite element solution lie a pitch apart, and their chords cut corners."""
+    fine = np.linspace(s[0], s[-1], int(np.ceil((s[-1] - s[0]) / spacing)) + 1)
+    return CubicSpline(s, points)(fine)
 
 
 def stopped_short(run):
@@ -92,22 +106,30 @@ def verdict(run, comparison):
         promise = f"the reduced model predicts to follow the target within {_mm(c.reduced_target)}"
     if c.solved is None:
         told = promise or "there is neither a target nor a finite element solution to judge the prediction by"
-        return f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet." if promise else f"{told[0].upper()}{told[1:]}."
+        return (
+            f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet."
+            if promise
+            else f"{told[0].upper()}{told[1:]}."
+        )
     pressure = f"{plain(run.solve.pressure * 1e3)} kPa"
     if c.reduced_solved is None:
         sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"
     else:
         percent = c.reduced_solved.percent(c.reduced_solved.rms)
         word = "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
-        sentence = (f"At {pressure} the finite element solution of the whole manipulator {word} the reduced prediction: "
-                    f"they differ by {_mm(c.reduced_solved)}")
+        sentence = (
+            f"At {pressure} the finite element solution of the whole manipulator {word} the reduced prediction: "
+            f"they differ by {_mm(c.reduced_solved)}"
+        )
     if promise:
         sentence += f"; {promise}, the finite element body misses it by {_mm(c.solved_target)}"
     if stopped_short(run):
         sentence += f" (it stopped short of the design pressure, {plain(design.pressure * 1e3)} kPa)"
     depth = overlap(run)
     if depth > 0:
-        sentence += f". Walls overlap by up to {depth:.2f} mm, so the finite element shape is not what a real body would take"
+        sentence += (
+            f". Walls overlap by up to {depth:.2f} mm, so the finite element shape is not what a real body would take"
+        )
     return sentence + "."
 
 

@@ -36,7 +36,9 @@ class SheetView:
         left, bottom, width, height = rectangle
         sheet_width, sheet_height = figure.get_size_inches()
         self.scale = scale
-        self.ax = figure.add_axes([left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height])
+        self.ax = figure.add_axes(
+            [left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height]
+        )
         x, y = x - right / scale, y - up / scale
         self.x0, self.x1 = x - width / 2 / scale, x + width / 2 / scale
         self.y0, self.y1 = y - height / 2 / scale, y + height / 2 / scale
@@ -65,7 +67,17 @@ class SheetView:
     def polygon(self, corners, face, width=0.8, style="-", alpha=1.0):
         from matplotlib.patches import Polygon
 
-        self.ax.add_patch(Polygon(corners, closed=True, facecolor=face, edgecolor=INK if width else "none", linewidth=width, linestyle=style, alpha=alpha))
+        self.ax.add_patch(
+            Polygon(
+                corners,
+                closed=True,
+                facecolor=face,
+                edgecolor=INK if width else "none",
+                linewidth=width,
+                linestyle=style,
+                alpha=alpha,
+            )
+        )
 
     def cut(self, solids, voids, colour, clip=None):
         """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); the cut at `clip` x is a break."""
@@ -87,7 +99,13 @@ class SheetView:
             low, high = min(b[2] for b in solids[:1]), max(b[3] for b in solids[:1])
             for x in clip:
                 self.ax.plot([x, x], [low, high], color="white", linewidth=2.4)
-                self.ax.plot([x, x], [low - self.mm(0.05), high + self.mm(0.05)], color=LINE, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
+                self.ax.plot(
+                    [x, x],
+                    [low - self.mm(0.05), high + self.mm(0.05)],
+                    color=LINE,
+                    linewidth=0.7,
+                    linestyle=(0, (6, 2, 1, 2)),
+                )
 
     def axes_cross(self):
         """The channel axis as a small centre mark."""
@@ -96,7 +114,13 @@ class SheetView:
         self.line([(0, -r), (0, r)], width=0.6)
 
     def _arrows(self, a, b, inside):
-        style = {"arrowstyle": "-|>,head_length=0.35,head_width=0.12", "color": LINE, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0}
+        style = {
+            "arrowstyle": "-|>,head_length=0.35,head_width=0.12",
+            "color": LINE,
+            "linewidth": 0.6,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        }
         a, b = np.asarray(a, float), np.asarray(b, float)
         if inside:
             pairs = [((a + b) / 2, a), ((a + b) / 2, b)]
@@ -144,7 +168,11 @@ class SheetView:
         for (a, b, text), middle, level in zip(intervals, middles, levels):
             self.line([(x, a), (x, b)], width=0.6)
             for y in (a, b):
-                self.line([(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))], width=0.9, colour=INK)
+                self.line(
+                    [(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))],
+                    width=0.9,
+                    colour=INK,
+                )
             self.line([(x, middle), (x + self.mm(0.18), level), (x + self.mm(0.24), level)], width=0.35)
             self.text(x + self.mm(0.27), level, text, ha="left")
 
@@ -154,7 +182,11 @@ class SheetView:
         for (a, b, text), level in zip(intervals, levels):
             for x in (a, b):
                 self.line([(x, y_part), (x, y - self.mm(0.05))], width=0.35)
-                self.line([(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))], width=0.9, colour=INK)
+                self.line(
+                    [(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))],
+                    width=0.9,
+                    colour=INK,
+                )
             self.line([(a, y), (b, y)], width=0.6)
             self.line([((a + b) / 2, y), (level, y - self.mm(0.08))], width=0.35)
             self.text(level, y - self.mm(0.1), text, va="top", rotation=90, size=7)
@@ -174,6 +206,15 @@ class SheetView:
     def balloon(self, x, y, number, text, colour):
         """A numbered circle with a line of text at its right, centred on x."""
         shift = self.mm(0.13 + text_width(text, 8.5)) / 2
-        self.ax.text(x - shift, y, str(number), ha="center", va="center", fontsize=9, weight="bold", color=INK,
-                     bbox={"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": INK, "linewidth": 0.7})
+        self.ax.text(
+            x - shift,
+            y,
+            str(number),
+            ha="center",
+            va="center",
+            fontsize=9,
+            weight="bold",
+            color=INK,
+            bbox={"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": INK, "linewidth": 0.7},
+        )
         self.text(x - shift + self.mm(0.17), y, text, ha="left", size=8.5)

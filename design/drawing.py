@@ -1,7 +1,5 @@
 """The dimensioned drawing of a manipulator: plan, side view, sections with every dimension in mm, table of segments."""
 
-import numpy as np
-
 from base.files import atomic_path
 from design.dimensions import SheetView
 from design.labels import REDUCED, plain, segment_colour, segment_mode
@@ -25,7 +23,10 @@ def segment_table(manipulator):
     return [
         row("mode", segment_mode),
         row("angle to the axis, deg", lambda s: plain(s.angle)),
-        row("chambers", lambda s: f"{s.chambers} pair{'s' * (s.chambers > 1)}" if s.kind == TWISTING else f"{s.chambers}"),
+        row(
+            "chambers",
+            lambda s: f"{s.chambers} pair{'s' * (s.chambers > 1)}" if s.kind == TWISTING else f"{s.chambers}",
+        ),
         row("axial pitch", lambda s: plain(s.pitch)),
         row("width", lambda s: plain(s.width)),
         row("chamber height (cavity)", lambda s: plain(s.chamber_height)),
@@ -52,8 +53,21 @@ def section_groups(manipulator):
     """Lists of segment indices that share the same cross-section (everything but angle, number, ends and material)."""
     groups = {}
     for i, s in enumerate(manipulator.segments):
-        key = (s.kind, s.width, s.chamber_height, s.cavity_thickness, s.wall, s.gap, s.top_wall, s.side_wall,
-               s.core_top, s.core_bottom, s.channel_width, s.channel_height, s.cavity_floor)
+        key = (
+            s.kind,
+            s.width,
+            s.chamber_height,
+            s.cavity_thickness,
+            s.wall,
+            s.gap,
+            s.top_wall,
+            s.side_wall,
+            s.core_top,
+            s.core_bottom,
+            s.channel_width,
+            s.channel_height,
+            s.cavity_floor,
+        )
         groups.setdefault(key, []).append(i)
     return list(groups.values())
 
@@ -61,8 +75,12 @@ def section_groups(manipulator):
 def chamber_plan(segment, x, thickness, half_width, side):
     """Plan corners (4, 2) in mm of a chamber (or cavity) centred at x; side -1 is the set turned half a turn about x."""
     half, slant = thickness / segment.sin / 2, segment.cot * half_width * side
-    return [(x - slant - half, -half_width), (x - slant + half, -half_width),
-            (x + slant + half, half_width), (x + slant - half, half_width)]
+    return [
+        (x - slant - half, -half_width),
+        (x - slant + half, -half_width),
+        (x + slant + half, half_width),
+        (x + slant - half, half_width),
+    ]
 
 
 def draw_drawing(design, path):
@@ -81,7 +99,10 @@ def drawing_figure(design):
     rows = segment_table(manipulator)
     scale = min((SHEET_WIDTH - 2 * MARGIN - 1.7) / manipulator.length, 0.16)
     plan_height = scale * max(s.width for s in manipulator.segments) + 1.9
-    side_height = scale * (max(s.chamber_top for s in manipulator.segments) - min(s.chamber_bottom for s in manipulator.segments)) + 1.7
+    side_height = (
+        scale * (max(s.chamber_top for s in manipulator.segments) - min(s.chamber_bottom for s in manipulator.segments))
+        + 1.7
+    )
     panel_rows = -(-(2 * len(groups) + 2) // COLUMNS)
     height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
     figure = Figure(figsize=(SHEET_WIDTH, height), facecolor="white")
@@ -89,10 +110,20 @@ def drawing_figure(design):
 
     top = height - MARGIN - 0.75
     width = SHEET_WIDTH - 2 * MARGIN
-    _plan(SheetView(figure, (MARGIN, top - plan_height, width, plan_height), scale, manipulator.length / 2, 0.0, up=-0.4), manipulator)
+    _plan(
+        SheetView(figure, (MARGIN, top - plan_height, width, plan_height), scale, manipulator.length / 2, 0.0, up=-0.4),
+        manipulator,
+    )
     top -= plan_height
-    middle = (max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)) / 2
-    _side(SheetView(figure, (MARGIN, top - side_height, width, side_height), scale, manipulator.length / 2, middle, up=0.48), manipulator)
+    middle = (
+        max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)
+    ) / 2
+    _side(
+        SheetView(
+            figure, (MARGIN, top - side_height, width, side_height), scale, manipulator.length / 2, middle, up=0.48
+        ),
+        manipulator,
+    )
     top -= side_height
 
     panels = [(draw, group) for group in groups for draw in (_cross_section, _normal_section)]
@@ -110,19 +141,27 @@ def drawing_figure(design):
 def _frame(figure, design, height):
     from matplotlib.patches import Rectangle
 
-    figure.add_artist(Rectangle((0.012, 0.2 / height), 0.976, 1 - 0.4 / height, fill=False, edgecolor=INK, linewidth=1.2))
+    figure.add_artist(
+        Rectangle((0.012, 0.2 / height), 0.976, 1 - 0.4 / height, fill=False, edgecolor=INK, linewidth=1.2)
+    )
     manipulator = design.manipulator
     x, y = MARGIN / SHEET_WIDTH, 1 - (MARGIN + 0.1) / height
     figure.text(x, y, design.name, fontsize=17, weight="bold", color=INK, va="top")
-    facts = (f"pneu-net soft manipulator, {len(manipulator.segments)} segment{'s' * (len(manipulator.segments) > 1)}, "
-             f"{manipulator.chambers} chambers/pairs, total length {plain(manipulator.length)} mm, "
-             f"design pressure {plain(design.pressure * 1e3)} kPa")
+    facts = (
+        f"pneu-net soft manipulator, {len(manipulator.segments)} segment{'s' * (len(manipulator.segments) > 1)}, "
+        f"{manipulator.chambers} chambers/pairs, total length {plain(manipulator.length)} mm, "
+        f"design pressure {plain(design.pressure * 1e3)} kPa"
+    )
     figure.text(x, y - 0.33 / height, facts, fontsize=10, color=INK, va="top")
     figure.text(1 - x, y, "all dimensions in mm", fontsize=10, color=INK, va="top", ha="right")
     materials = {s.material.name: s.material for s in manipulator.segments}.values()
-    told = "; ".join(f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials)
-    notes = (f"Material {told}.\n\"Normal\" = measured across the chamber. z = 0 is the channel axis (blue). The lower chambers of a "
-             "twisting segment are the upper ones turned by half a turn about x. One cavity: the channel joins all chambers.")
+    told = "; ".join(
+        f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials
+    )
+    notes = (
+        f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The lower chambers of a '
+        "twisting segment are the upper ones turned by half a turn about x. One cavity: the channel joins all chambers."
+    )
     figure.text(x, (MARGIN + 0.42) / height, notes, fontsize=8.5, color=INK, va="top", linespacing=1.4)
 
 
@@ -135,7 +174,9 @@ def _plan(view, manipulator):
     view.title(-view.mm(0.28), view.mm(0.3), "plan")
     for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
         half = s.width / 2
-        view.polygon([(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)], face="#f1f3f5")
+        view.polygon(
+            [(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)], face="#f1f3f5"
+        )
         for side in reversed(s.sides):
             for x in start + s.chamber_positions:
                 outline = chamber_plan(s, x, s.chamber_thickness, half, side)
@@ -155,7 +196,12 @@ def _plan(view, manipulator):
         if s.chambers > 1:
             x = first - half * s.cot
             view.horizontal(x, x + s.pitch, -half, -half - view.mm(0.3), f"pitch {plain(s.pitch)}")
-    view.line([(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)], width=0.6, style=(0, (12, 3, 2, 3)), colour=REDUCED)
+    view.line(
+        [(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)],
+        width=0.6,
+        style=(0, (12, 3, 2, 3)),
+        colour=REDUCED,
+    )
     view.text(-view.mm(0.28), 0, "base", ha="right")
     view.text(manipulator.length + view.mm(0.28), 0, "tip", ha="left")
 
@@ -171,13 +217,31 @@ def _side(view, manipulator):
                 for x in start + s.chamber_positions:
                     corners = [c[0] for c in chamber_plan(s, x, s.chamber_thickness, s.width / 2, side)]
                     x0, x1 = (min(corners), max(corners)) if width is None else (corners[0], corners[1])
-                    view.polygon([(x0, z0), (x1, z0), (x1, z1), (x0, z1)], face=segment_colour(i), width=width or 0.4, alpha=shade)
-        view.polygon([(start, s.core_bottom), (start + s.length, s.core_bottom), (start + s.length, s.core_top), (start, s.core_top)],
-                     face="#e4e8ec", width=0.9)
+                    view.polygon(
+                        [(x0, z0), (x1, z0), (x1, z1), (x0, z1)],
+                        face=segment_colour(i),
+                        width=width or 0.4,
+                        alpha=shade,
+                    )
+        view.polygon(
+            [
+                (start, s.core_bottom),
+                (start + s.length, s.core_bottom),
+                (start + s.length, s.core_top),
+                (start, s.core_top),
+            ],
+            face="#e4e8ec",
+            width=0.9,
+        )
         a, b = start + s.end_length, start + s.end_length + s.active_length
         ends += [(start, a, plain(s.end_length)), (b, start + s.length, plain(s.end_length))]
         lengths.append((start, start + s.length, plain(s.length), (a, b, plain(s.active_length))))
-    view.line([(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)], width=0.6, style=(0, (12, 3, 2, 3)), colour=REDUCED)
+    view.line(
+        [(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)],
+        width=0.6,
+        style=(0, (12, 3, 2, 3)),
+        colour=REDUCED,
+    )
     low = min(s.chamber_bottom for s in manipulator.segments)
     view.chain_below(ends, low, low - view.mm(0.25))
     for start, stop, text, (a, b, active) in lengths:
@@ -191,7 +255,9 @@ def _side(view, manipulator):
 def _section_scale(s):
     """Inches per mm at which both sections of a segment leave room for their dimensions."""
     normal_width = 2 * s.chamber_thickness + s.gap + 3.0
-    return min((PANEL_WIDTH - 2.05) / max(s.width, normal_width), (PANEL_HEIGHT - 1.95) / (s.chamber_top - s.chamber_bottom))
+    return min(
+        (PANEL_WIDTH - 2.05) / max(s.width, normal_width), (PANEL_HEIGHT - 1.95) / (s.chamber_top - s.chamber_bottom)
+    )
 
 
 def _named(group, what):
@@ -212,13 +278,23 @@ def _cross_section(figure, rectangle, scale, manipulator, group):
     view.axes_cross()
     top, low = s.chamber_top, s.chamber_bottom
     view.heading(_named(group, "through a chamber, along x"))
-    view.horizontal(-s.cavity_width / 2, s.cavity_width / 2, s.cavity_top, top + view.mm(0.2), f"cavity {plain(s.cavity_width)}")
+    view.horizontal(
+        -s.cavity_width / 2, s.cavity_width / 2, s.cavity_top, top + view.mm(0.2), f"cavity {plain(s.cavity_width)}"
+    )
     view.horizontal(s.cavity_width / 2, half, s.cavity_top, top + view.mm(0.2 + ROW), f"side wall {plain(s.side_wall)}")
-    view.horizontal(-s.channel_width / 2, s.channel_width / 2, -s.channel_height / 2, low - view.mm(0.2), f"channel {plain(s.channel_width)}")
+    view.horizontal(
+        -s.channel_width / 2,
+        s.channel_width / 2,
+        -s.channel_height / 2,
+        low - view.mm(0.2),
+        f"channel {plain(s.channel_width)}",
+    )
     view.horizontal(-half, half, low, low - view.mm(0.2 + ROW), f"width {plain(s.width)}")
     view.vertical(low, top, -half, -half - view.mm(0.25), f"{plain(top - low)}")
-    core = [(-s.channel_height / 2, s.channel_height / 2, f"channel {plain(s.channel_height)}"),
-            (s.channel_height / 2, s.core_top, f"roof {plain(s.roof)}")]
+    core = [
+        (-s.channel_height / 2, s.channel_height / 2, f"channel {plain(s.channel_height)}"),
+        (s.channel_height / 2, s.core_top, f"roof {plain(s.roof)}"),
+    ]
     below = "roof" if s.kind == TWISTING else "base"
     core.insert(0, (s.core_bottom, -s.channel_height / 2, f"{below} {plain(-s.channel_height / 2 - s.core_bottom)}"))
     view.ladder(core, half, half + view.mm(0.2))
@@ -248,12 +324,16 @@ def _normal_section(figure, rectangle, scale, manipulator, group):
         view.horizontal(s.chamber_thickness, step, low, y - view.mm(2 * ROW), f"gap {plain(s.gap)}")
         view.horizontal(0.0, step, top, top + view.mm(0.2), f"normal pitch {plain(step)}")
     edge = stop + margin
-    heights = [(s.cavity_floor, s.cavity_top, f"chamber {plain(s.chamber_height)}"),
-               (s.cavity_top, s.chamber_top, f"top wall {plain(s.top_wall)}")]
+    heights = [
+        (s.cavity_floor, s.cavity_top, f"chamber {plain(s.chamber_height)}"),
+        (s.cavity_top, s.chamber_top, f"top wall {plain(s.top_wall)}"),
+    ]
     if s.cavity_floor > 0:
         heights.insert(0, (0.0, s.cavity_floor, f"floor {plain(s.cavity_floor)}"))
     view.ladder(heights, stop, edge + view.mm(0.15))
-    view.vertical(s.core_bottom, s.core_top, -margin, -margin - view.mm(0.25), f"core {plain(s.core_top - s.core_bottom)}")
+    view.vertical(
+        s.core_bottom, s.core_top, -margin, -margin - view.mm(0.25), f"core {plain(s.core_top - s.core_bottom)}"
+    )
 
 
 def _table(figure, rectangle, rows):
@@ -280,6 +360,11 @@ def _table(figure, rectangle, rows):
         for i, value in enumerate(values):
             # long words (material names) are cut to what the column holds
             room = int(cell * 72 / (0.56 * size))
-            view.text(label_width + cell * (i + 0.5), y + step / 2, value if len(value) <= room else value[: room - 1] + "…", size=size)
+            view.text(
+                label_width + cell * (i + 0.5),
+                y + step / 2,
+                value if len(value) <= room else value[: room - 1] + "…",
+                size=size,
+            )
     view.polygon([(0, 0), (right, 0), (right, height), (0, height)], face="none", width=0.8)
     view.line([(0, height - step), (right, height - step)], width=0.8)

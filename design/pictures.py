@@ -51,7 +51,9 @@ def curve_panels(figure, curves, segments=None, bottom=0.06):
     curves : [(label, points (n, 3) in mm, style of STYLES)]. segments : [(colour, points)], bands under the curves.
     """
     everything = np.vstack([points for _, points, _ in curves])
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32)
+    grid = figure.add_gridspec(
+        2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32
+    )
     ax = figure.add_subplot(grid[:, 0], projection="3d")
     ax.view_init(*camera_angles(everything))
     band = {"linewidth": 9, "alpha": 0.75, "solid_capstyle": "butt", "zorder": 1}
@@ -92,21 +94,34 @@ def legend(figure, curves, manipulator):
     from matplotlib.lines import Line2D
 
     lines = [Line2D([], [], label=label, **STYLES[style]) for label, _, style in curves]
-    bands = [Line2D([], [], color=segment_colour(i), linewidth=9, alpha=0.75, label=f"{i + 1}  {segment_name(s)}")
-             for i, s in enumerate(manipulator.segments)]
+    bands = [
+        Line2D([], [], color=segment_colour(i), linewidth=9, alpha=0.75, label=f"{i + 1}  {segment_name(s)}")
+        for i, s in enumerate(manipulator.segments)
+    ]
     for handles, height in ((lines, 0.995), (bands, 0.955)):
-        figure.legend(handles=handles, loc="upper right", ncols=min(len(handles), 5), fontsize=8.5, frameon=False,
-                      bbox_to_anchor=(0.985, height), handlelength=2.4, columnspacing=1.6)
+        figure.legend(
+            handles=handles,
+            loc="upper right",
+            ncols=min(len(handles), 5),
+            fontsize=8.5,
+            frameon=False,
+            bbox_to_anchor=(0.985, height),
+            handlelength=2.4,
+            columnspacing=1.6,
+        )
 
 
 def error_caption(errors):
     """The four errors and the length mismatch (`design.metrics.Errors`) in two lines."""
+
     def both(mm):
         return f"{mm:.2f} mm ({errors.percent(mm):.1f} %)"
 
-    return (f"RMS paired by arc length {both(errors.rms)},  two-sided Hausdorff {both(errors.hausdorff)},  tip {both(errors.tip)}\n"
-            f"Eq. 27 sum over {errors.eq27_points} points {errors.eq27:.4g} mm²,  length {errors.length:.1f} mm, wanted "
-            f"{errors.reference_length:.1f} mm ({errors.percent(errors.length_mismatch):+.1f} %)    [% of the wanted length]")
+    return (
+        f"RMS paired by arc length {both(errors.rms)},  two-sided Hausdorff {both(errors.hausdorff)},  tip {both(errors.tip)}\n"
+        f"Eq. 27 sum over {errors.eq27_points} points {errors.eq27:.4g} mm²,  length {errors.length:.1f} mm, wanted "
+        f"{errors.reference_length:.1f} mm ({errors.percent(errors.length_mismatch):+.1f} %)    [% of the wanted length]"
+    )
 
 
 def draw_design(directory):
@@ -125,8 +140,13 @@ def draw_design(directory):
     curve_panels(fig, curves, segment_bands(design.manipulator, s, points), bottom=0.15)
     legend(fig, curves, design.manipulator)
     fig.text(0.025, 0.975, design.name, fontsize=15, weight="bold", va="top")
-    fig.text(0.025, 0.925, f"{plain(design.pressure * 1e3)} kPa, {design.manipulator.chambers} chambers, {plain(design.manipulator.length, 1)} mm long at rest",
-             fontsize=10, va="top")
+    fig.text(
+        0.025,
+        0.925,
+        f"{plain(design.pressure * 1e3)} kPa, {design.manipulator.chambers} chambers, {plain(design.manipulator.length, 1)} mm long at rest",
+        fontsize=10,
+        va="top",
+    )
     fig.text(0.025, 0.02, caption, fontsize=9, linespacing=1.5)
     save(fig, run.directory / "design.png")
     return run.directory / "design.png"

@@ -53,10 +53,14 @@ def write_report(directory, say=print, model=None):
         ("Drawing, dimensions, material", _drawing(run, folder)),
         ("How it was computed", _computed(run)),
     ]
-    body = _headline(run, comparison) + "".join(f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections)
-    page = (f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"<title>{escape(run.design.name)}: pneunet report</title><style>{STYLE}</style></head><body>{body}"
-            f"<footer>pneunet report, revision {escape(revision())}. Lengths in mm, pressures in kPa.</footer></body></html>\n")
+    body = _headline(run, comparison) + "".join(
+        f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections
+    )
+    page = (
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(run.design.name)}: pneunet report</title><style>{STYLE}</style></head><body>{body}"
+        f"<footer>pneunet report, revision {escape(revision())}. Lengths in mm, pressures in kPa.</footer></body></html>\n"
+    )
     path = run.directory / "report.html"
     write_text(path, page)
     say(verdict(run, comparison))
@@ -81,7 +85,11 @@ def _table(header, rows):
         if isinstance(row, str):
             out += f'<tr class="head"><td colspan="{len(header)}">{escape(row)}</td></tr>'
         else:
-            out += "<tr>" + "".join(f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row) + "</tr>"
+            out += (
+                "<tr>"
+                + "".join(f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row)
+                + "</tr>"
+            )
     return f'<div class="table"><table>{out}</table></div>'
 
 
@@ -98,16 +106,20 @@ def _headline(run, comparison):
         length = f", {errors.reference_length:.1f} mm long" if errors else ""
         asked = f"A curve of {len(run.target)} points{length} ({design.target or 'target.csv'})."
     names = ", ".join(segment_name(s) for s in m.segments)
-    designed = (f"{len(m.segments)} segment{'s' * (len(m.segments) > 1)} ({names}), {m.length:.1f} mm long at rest, "
-                f"{m.segments[0].width:g} mm wide, one pressure of {plain(design.pressure * 1e3)} kPa.")
+    designed = (
+        f"{len(m.segments)} segment{'s' * (len(m.segments) > 1)} ({names}), {m.length:.1f} mm long at rest, "
+        f"{m.segments[0].width:g} mm wide, one pressure of {plain(design.pressure * 1e3)} kPa."
+    )
     out = f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b> {escape(designed)}</p>"
     out += f'<p class="verdict">{escape(verdict(run, comparison))}</p>'
     if overlap(run) > 0:
         out += f'<p class="alarm">WALLS OVERLAP by up to {overlap(run):.2f} mm in the finite element solution (table below).</p>'
     out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
     if c.reduced_solved:
-        out += (f'<p class="missing">"Confirms" means an RMS distance of at most {CONFIRMS:g} % of length, "roughly" at most {ROUGHLY:g} %, '
-                'beyond that "contradicts".</p>')
+        out += (
+            f'<p class="missing">"Confirms" means an RMS distance of at most {CONFIRMS:g} % of length, "roughly" at most {ROUGHLY:g} %, '
+            'beyond that "contradicts".</p>'
+        )
     return out
 
 
@@ -121,14 +133,22 @@ def _shapes(run, comparison, model, folder):
     bodies = figures.body_pictures(run, comparison, model, folder)
     fields = [b for b in bodies if b[0] in ("fe_displacement.png", "fe_stretch.png", "reference.png")]
     beside = [b for b in bodies if b not in fields]
-    return out + "<p>Same camera and scale for all pictures but the body at rest.</p>" + _grid(folder, beside) + "".join(
-        _image(folder, *c) for c in curves) + _grid(folder, fields)
+    return (
+        out
+        + "<p>Same camera and scale for all pictures but the body at rest.</p>"
+        + _grid(folder, beside)
+        + "".join(_image(folder, *c) for c in curves)
+        + _grid(folder, fields)
+    )
 
 
 def _errors(comparison, run):
     at = f" at {plain(run.solve.pressure * 1e3)} kPa" if run.solve else ""
-    columns = [(f"reduced vs target at {plain(run.design.pressure * 1e3)} kPa", comparison.reduced_target),
-               (f"FE vs target{at}", comparison.solved_target), (f"reduced vs FE{at}", comparison.reduced_solved)]
+    columns = [
+        (f"reduced vs target at {plain(run.design.pressure * 1e3)} kPa", comparison.reduced_target),
+        (f"FE vs target{at}", comparison.solved_target),
+        (f"reduced vs FE{at}", comparison.reduced_solved),
+    ]
     columns = [(name, e) for name, e in columns if e is not None]
     if not columns:
         return _missing("There are no two curves to compare.")
@@ -140,7 +160,8 @@ def _errors(comparison, run):
         ["RMS, points paired by arc length"] + [both(e, e.rms) for _, e in columns],
         ["two-sided Hausdorff distance"] + [both(e, e.hausdorff) for _, e in columns],
         ["tip distance"] + [both(e, e.tip) for _, e in columns],
-        ["Eq. 27 (sum of squared nearest distances)"] + [f"{e.eq27:.4g} mm² over {e.eq27_points} points" for _, e in columns],
+        ["Eq. 27 (sum of squared nearest distances)"]
+        + [f"{e.eq27:.4g} mm² over {e.eq27_points} points" for _, e in columns],
         ["length mismatch"] + [both(e, e.length_mismatch, "+") for _, e in columns],
         ["lengths"] + [f"{e.length:.2f} mm vs {e.reference_length:.2f} mm" for _, e in columns],
     ]
@@ -168,8 +189,10 @@ def _strains(run, comparison):
             told = "-" if reduced is None else _fixed(reduced, digits)
             ratio = "-" if reduced is None or abs(reduced) < 10.0**-digits else f"{fe / reduced:.3f}"
             rows.append([label, told, _fixed(fe, digits), ratio])
-    return (_table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
-            + "<p>Strains refer to the section frame on the channel axis. |k| and k.e of a uniform screw do not depend on that choice.</p>")
+    return (
+        _table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
+        + "<p>Strains refer to the section frame on the channel axis. |k| and k.e of a uniform screw do not depend on that choice.</p>"
+    )
 
 
 def _fixed(value, digits):
@@ -188,8 +211,10 @@ def _walls(run, folder):
         return _missing("No wall distances: there is no finite element solution yet, or the body has no gaps.")
     depth = overlap(run)
     if depth > 0:
-        out = (f'<p class="alarm">WALLS OVERLAP in {sum(d < 0 for *_, d in run.solve.walls)} of {len(run.solve.walls)} gaps, by up to '
-               f"{depth:.2f} mm. Contact is not part of this solution; a real body would be stopped by it.</p>")
+        out = (
+            f'<p class="alarm">WALLS OVERLAP in {sum(d < 0 for *_, d in run.solve.walls)} of {len(run.solve.walls)} gaps, by up to '
+            f"{depth:.2f} mm. Contact is not part of this solution; a real body would be stopped by it.</p>"
+        )
     else:
         out = f"<p>No walls touch: the smallest distance is {min(d for *_, d in run.solve.walls):.2f} mm.</p>"
     out += "".join(_image(folder, *p) for p in figures.wall_picture(run, folder))
@@ -198,17 +223,29 @@ def _walls(run, folder):
         here = [(d, gap) for a, b, gap, d in run.solve.walls if (a, b) == key]
         distance, gap = min(here)
         rest = run.design.manipulator.segments[key[0] - 1].gap
-        rows.append([f"{key[0]}, {'upper' if key[1] > 0 else 'lower'}", len(here), plain(rest), f"{distance:.3f}", gap,
-                     "OVERLAP" if distance < 0 else "open"])
+        rows.append(
+            [
+                f"{key[0]}, {'upper' if key[1] > 0 else 'lower'}",
+                len(here),
+                plain(rest),
+                f"{distance:.3f}",
+                gap,
+                "OVERLAP" if distance < 0 else "open",
+            ]
+        )
     return out + _table(["segment, side", "gaps", "gap at rest, mm", "smallest distance, mm", "in gap", ""], rows)
 
 
 def _drawing(run, folder):
     rows = segment_table(run.design.manipulator)
-    table = _table(["segment", *[str(i + 1) for i in range(len(rows[0][1]))]], [[label, *values] for label, values in rows])
+    table = _table(
+        ["segment", *[str(i + 1) for i in range(len(rows[0][1]))]], [[label, *values] for label, values in rows]
+    )
     materials = {s.material.name: s.material for s in run.design.manipulator.segments}.values()
-    told = _table(["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],
-                  [[m.name, m.law, plain(m.mu, 4), plain(m.density * 1e12), m.source or "-"] for m in materials])
+    told = _table(
+        ["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],
+        [[m.name, m.law, plain(m.mu, 4), plain(m.density * 1e12), m.source or "-"] for m in materials],
+    )
     return _image(folder, "drawing.png", "All dimensions in mm.") + table + told
 
 
@@ -232,12 +269,20 @@ def _computed(run):
     out = ""
     if run.solve is not None:
         steps = run.solve.steps
-        rows = [["accepted steps", len(steps["step"])], ["Newton iterations", int(steps["iterations"].sum())],
-                ["factorisations", int(steps["factorisations"].sum())], ["seconds in steps", f"{steps['seconds'].sum():.1f}"],
-                ["last pressure, kPa", plain(run.solve.pressure * 1e3)],
-                ["reached the design pressure", "no" if stopped_short(run) else "yes"]]
+        rows = [
+            ["accepted steps", int(steps["step"][-1])],
+            ["Newton iterations", int(steps["iterations"].sum())],
+            ["factorisations", int(steps["factorisations"].sum())],
+            ["seconds in steps", f"{steps['seconds'][-1]:.1f}"],
+            ["last pressure, kPa", plain(run.solve.pressure * 1e3)],
+            ["reached the design pressure", "no" if stopped_short(run) else "yes"],
+        ]
         out += _table(["finite element solution", ""], rows)
-    records = [("design (run.json)", run.record), ("mesh (mesh/mesh.json)", run.mesh), ("finite elements (solve/run.json)", run.solve.record if run.solve else {})]
+    records = [
+        ("design (run.json)", run.record),
+        ("mesh (mesh/mesh.json)", run.mesh),
+        ("finite elements (solve/run.json)", run.solve.record if run.solve else {}),
+    ]
     for title, record in records:
         out += _table([title, ""], _flat(record)) if record else _missing(f"No record: {title}.")
     return out

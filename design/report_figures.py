@@ -5,7 +5,7 @@ import numpy as np
 from base.errors import ConvergenceError
 from design import bodies
 from design.drawing import chamber_plan
-from design.labels import FINITE_ELEMENTS, REDUCED, plain, segment_colour, segment_name
+from design.labels import FINITE_ELEMENTS, plain, segment_colour
 from design.pictures import curve_panels, figure, legend, save, segment_bands
 from reduced.model import predict
 
@@ -24,7 +24,8 @@ def curve_picture(run, comparison, folder):
     bands = None
     if comparison.solved is not None:
         curves.append((f"finite elements, {plain(pressure * 1e3)} kPa", comparison.solved, "finite elements"))
-        bands = segment_bands(design.manipulator, run.solve.s, comparison.solved)
+        s = np.linspace(run.solve.s[0], run.solve.s[-1], len(comparison.solved))
+        bands = segment_bands(design.manipulator, s, comparison.solved)
     if not curves:
         return []
     fig = figure(11.0, 6.2)
@@ -32,8 +33,14 @@ def curve_picture(run, comparison, folder):
     legend(fig, curves, design.manipulator)
     save(fig, folder / "curves.png", dpi=110)
     where = "finite element curve" if bands else "picture"
-    return [("curves.png", f"Centrelines in 3D and in two projections, equal scale; segments coloured along the {where}." if bands else
-             "Centrelines in 3D and in two projections, equal scale.")]
+    return [
+        (
+            "curves.png",
+            f"Centrelines in 3D and in two projections, equal scale; segments coloured along the {where}."
+            if bands
+            else "Centrelines in 3D and in two projections, equal scale.",
+        )
+    ]
 
 
 def body_pictures(run, comparison, model, folder):
@@ -63,22 +70,47 @@ def body_pictures(run, comparison, model, folder):
     if target:
         picture("target.png", with_target, "target", "The target curve (black in every picture of this row).")
     if reduced is not None:
-        picture("reduced.png", bodies.painted(reduced) + with_target, f"reduced model, {kPa}", "The reduced model's body, coloured by segment.")
+        picture(
+            "reduced.png",
+            bodies.painted(reduced) + with_target,
+            f"reduced model, {kPa}",
+            "The reduced model's body, coloured by segment.",
+        )
     if solved is not None:
         plainly = {"color": FINITE_ELEMENTS, "opacity": 1.0}
-        picture("fe.png", [(solved, plainly), solved_edges, *with_target], f"finite elements, {kPa}", "The finite element body.")
-        for name, field, label, cmap in (("fe_displacement.png", "displacement length", "displacement (mm)", "viridis"),
-                                         ("fe_stretch.png", "stretch", "largest principal stretch (-)", "inferno")):
+        picture(
+            "fe.png",
+            [(solved, plainly), solved_edges, *with_target],
+            f"finite elements, {kPa}",
+            "The finite element body.",
+        )
+        for name, field, label, cmap in (
+            ("fe_displacement.png", "displacement length", "displacement (mm)", "viridis"),
+            ("fe_stretch.png", "stretch", "largest principal stretch (-)", "inferno"),
+        ):
             if field not in solved.point_data:
                 continue
             values = solved.point_data[field]
             top = np.percentile(values, 99.5)
             limits = (float(values.min()), float(max(top, values.min() + 1e-9)))
-            beyond = f"; 0.5 % of the nodes lie above the scale, up to {values.max():.2f}" if values.max() > 1.01 * top else ""
-            picture(name, [bodies.coloured(solved, field, limits, cmap), solved_edges], f"{label.split(' (')[0]}, {kPa}",
-                    f"Finite element body coloured by {label.split(' (')[0]}{beyond}.", (label, limits, cmap))
+            beyond = (
+                f"; 0.5 % of its nodes lie above the scale, up to {values.max():.2f}"
+                if values.max() > 1.01 * top
+                else ""
+            )
+            if field == "stretch":
+                beyond += f"; the largest inside the elements is {run.solve.steps['largest_stretch'][-1]:.2f}"
+            picture(
+                name,
+                [bodies.coloured(solved, field, limits, cmap), solved_edges],
+                f"{label.split(' (')[0]}, {kPa}",
+                f"Finite element body coloured by {label.split(' (')[0]}{beyond}.",
+                (label, limits, cmap),
+            )
     rest_view = bodies.view_of(rest.points)
-    bodies.write_picture(folder / "reference.png", rest_view, bodies.render(rest_view, bodies.painted(rest)), "reference body, 0 kPa")
+    bodies.write_picture(
+        folder / "reference.png", rest_view, bodies.render(rest_view, bodies.painted(rest)), "reference body, 0 kPa"
+    )
     out.append(("reference.png", "The body at rest (its own scale)."))
     return out
 
@@ -97,15 +129,26 @@ def history_picture(run, model, folder):
             break
     tips = np.array(tips)
     for i, (name, colour) in enumerate(zip("xyz", ("#1f6fb2", "#2f9e44", "#d9480f"))):
-        axes[0, 0].plot(p, steps[f"tip_{name}_mm"], "o-", color=colour, markersize=3, linewidth=1.4, label=f"{name}, finite elements")
+        axes[0, 0].plot(
+            p,
+            steps[f"tip_{name}_mm"],
+            "o-",
+            color=colour,
+            markersize=3,
+            linewidth=1.4,
+            label=f"{name}, finite elements",
+        )
         if len(tips):
             axes[0, 0].plot(tips[:, 0], tips[:, i + 1], "--", color=colour, linewidth=1.2, label=f"{name}, reduced")
     axes[0, 0].set_ylabel("tip, body axes (mm)")
     axes[0, 0].legend(fontsize=7, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
-    for ax, column, label in ((axes[0, 1], "volume_mm3", "cavity volume (mm³)"),
-                              (axes[1, 0], "smallest_wall_distance_mm", "smallest wall distance (mm)"),
-                              (axes[1, 1], "largest_stretch", "largest stretch (-)")):
-        ax.plot(p, steps[column], "o-", color=FINITE_ELEMENTS, markersize=3, linewidth=1.4)
+    for ax, column, label in (
+        (axes[0, 1], "volume_mm3", "cavity volume (mm³)"),
+        (axes[1, 0], "smallest_wall_distance_mm", "smallest wall distance (mm)"),
+        (axes[1, 1], "largest_stretch", "largest stretch (-)"),
+    ):
+        values = np.where(np.isfinite(steps[column]), steps[column], np.nan)  # no gaps, no distance: infinity
+        ax.plot(p, values, "o-", color=FINITE_ELEMENTS, markersize=3, linewidth=1.4)
         ax.set_ylabel(label)
     low = axes[1, 0].get_ylim()[0]
     axes[1, 0].axhline(0.0, color="#c92a2a", linewidth=1.0)
@@ -118,8 +161,13 @@ def history_picture(run, model, folder):
         ax.grid(True, linewidth=0.4, alpha=0.6)
     fig.subplots_adjust(left=0.08, right=0.98, top=0.92, bottom=0.08, wspace=0.24, hspace=0.28)
     save(fig, folder / "history.png", dpi=110)
-    return [("history.png", "Load history of the finite element solution, one mark an accepted step; the reduced model's tip dashed; "
-             "dotted: design pressure; red: overlapping walls.")]
+    return [
+        (
+            "history.png",
+            "Load history of the finite element solution, one mark an accepted step; the reduced model's tip dashed; "
+            "dotted: design pressure; red: overlapping walls.",
+        )
+    ]
 
 
 def wall_picture(run, folder):
@@ -144,26 +192,58 @@ def wall_picture(run, folder):
         ax = fig.add_axes([0.07, 1 - (row + 1) * (strip + 0.45) / height, 0.9, strip / height])
         for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
             w = s.width / 2
-            ax.add_patch(Polygon([(start, -w), (start + s.length, -w), (start + s.length, w), (start, w)], facecolor="#e9ecef", edgecolor="#495057", linewidth=0.8))
+            ax.add_patch(
+                Polygon(
+                    [(start, -w), (start + s.length, -w), (start + s.length, w), (start, w)],
+                    facecolor="#e9ecef",
+                    edgecolor="#495057",
+                    linewidth=0.8,
+                )
+            )
             if side not in s.sides:
                 continue
             for x in start + s.chamber_positions:
-                ax.add_patch(Polygon(chamber_plan(s, x, s.chamber_thickness, w, side), facecolor=segment_colour(i), alpha=0.45, edgecolor="none"))
+                ax.add_patch(
+                    Polygon(
+                        chamber_plan(s, x, s.chamber_thickness, w, side),
+                        facecolor=segment_colour(i),
+                        alpha=0.45,
+                        edgecolor="none",
+                    )
+                )
             for gap, x in enumerate((start + s.chamber_positions)[:-1] + s.pitch / 2, start=1):
                 distance = walls.get((i + 1, side, gap))
                 if distance is not None:
-                    ax.add_patch(Polygon(chamber_plan(s, x, s.gap, w, side), facecolor=ScalarMappable(norm, "RdBu").to_rgba(distance), edgecolor="#212529", linewidth=0.7))
+                    ax.add_patch(
+                        Polygon(
+                            chamber_plan(s, x, s.gap, w, side),
+                            facecolor=ScalarMappable(norm, "RdBu").to_rgba(distance),
+                            edgecolor="#212529",
+                            linewidth=0.7,
+                        )
+                    )
                     if distance < 0:
                         ax.plot(x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False)
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
-        ax.set_title("upper chambers" if side > 0 else "lower chambers (seen through the body)", fontsize=9, loc="left", pad=7)
+        ax.set_title(
+            "upper chambers" if side > 0 else "lower chambers (seen through the body)", fontsize=9, loc="left", pad=7
+        )
         ax.set_yticks([])
         ax.tick_params(labelsize=8)
         for edge in ("left", "right", "top"):
             ax.spines[edge].set_visible(False)
-    fig.colorbar(ScalarMappable(norm, "RdBu"), cax=fig.add_axes([0.25, 0.45 / height, 0.5, 0.13 / height]), orientation="horizontal",
-                 label="smallest distance of the walls facing each other (mm); negative = overlap")
+    fig.colorbar(
+        ScalarMappable(norm, "RdBu"),
+        cax=fig.add_axes([0.25, 0.45 / height, 0.5, 0.13 / height]),
+        orientation="horizontal",
+        label="smallest distance of the walls facing each other (mm); negative = overlap",
+    )
     save(fig, folder / "walls.png", dpi=110)
-    return [("walls.png", "Plan of the body at rest (x in mm), every gap coloured by the smallest distance of its walls in the last step. "
-             "Red triangles mark overlap.")]
+    return [
+        (
+            "walls.png",
+            "Plan of the body at rest (x in mm), every gap coloured by the smallest distance of its walls in the last step. "
+            "Red triangles mark overlap.",
+        )
+    ]

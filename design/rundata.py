@@ -12,17 +12,28 @@ from base.strains import RodStrains
 from geometry.designfile import Design, read_design
 
 POINTS = ["x_mm", "y_mm", "z_mm"]
-STEP_COLUMNS = ["step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
-                "smallest_wall_distance_mm", "largest_stretch", "seconds"]
+STEP_COLUMNS = [
+    "step",
+    "pressure_kPa",
+    "iterations",
+    "factorisations",
+    "volume_mm3",
+    "tip_x_mm",
+    "tip_y_mm",
+    "tip_z_mm",
+    "smallest_wall_distance_mm",
+    "largest_stretch",
+    "seconds",
+]
 
 
 @dataclass(frozen=True)
 class Solve:
     """The finite element solution. Lengths in mm, body frame; kPa as in the files.
 
-    steps: {column: (n,)}; pressure of the last accepted step in MPa; s (m,), points (m, 3): its centreline;
-    strains: RodStrains of shape (segments, 3) at that step; walls: [(segment 1.., side +1/-1, gap 1.., distance)];
-    solution: the ParaView file, or None; record: run.json.
+    steps: {column: (n,)}, "seconds" counted from the start; pressure of the last accepted step in MPa; s (m,),
+    points (m, 3): its centreline; strains: RodStrains of shape (segments, 3) at that step; walls: [(segment 1..,
+    side +1/-1, gap 1.., distance)] of the gaps that have walls; solution: the ParaView file, or None; record: run.json.
     """
 
     steps: dict
@@ -79,16 +90,19 @@ def _json(path):
 
 
 def _solve(directory):
-    """The solve with at least one accepted step, else None."""
-    if not (directory / "steps.csv").is_file() or len(read_csv(directory / "steps.csv")[1]) == 0:
+    """The solve, if a step beyond the rest state was accepted; else None."""
+    if not (directory / "steps.csv").is_file():
         return None
     table = read_columns(directory / "steps.csv", STEP_COLUMNS)
+    if not len(table) or table[-1, 1] == 0:
+        return None
     last = table[-1, 0]
     centrelines = read_columns(directory / "centrelines.csv", ["step", "s_mm", *POINTS])
     centreline = centrelines[centrelines[:, 0] == last]
-    strains = read_columns(directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"])
+    strains = read_columns(
+        directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"]
+    )
     strains = strains[strains[:, 0] == last]
-    walls = directory / "walls.csv"
     solution = directory / "solution.pvd"
     return Solve(
         steps=dict(zip(STEP_COLUMNS, table.T)),
@@ -96,7 +110,16 @@ def _solve(directory):
         s=centreline[:, 1],
         points=centreline[:, 2:],
         strains=RodStrains(strains[:, 1:4], strains[:, 4:7]),
-        walls=[(int(a), int(b), int(c), d) for a, b, c, d in read_columns(walls, ["segment", "side", "gap", "distance_mm"])] if walls.is_file() else [],
+        walls=_walls(directory / "walls.csv"),
         solution=solution if solution.is_file() else None,
         record=_json(directory / "run.json"),
     )
+
+
+def _walls(path):
+    if not path.is_file():
+        return []
+    header, rows = read_csv(path)
+    read = [dict(zip(header, row)) for row in rows]
+    found = [(int(r["segment"]), 1 if r["side"] == "top" else -1, int(r["gap"]), float(r["distance_mm"])) for r in read]
+    return [gap for gap in found if np.isfinite(gap[3])]

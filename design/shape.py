@@ -46,16 +46,25 @@ def run_shape(design_path, pressures, directory, say=print, model=None):
     say(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
     for p, line in shapes.items():
         tip = line.points[-1]
-        say(f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm")
+        say(
+            f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm"
+        )
     try:
         _pictures(design, shapes, model, folder, say)
     except ImportError as error:
         say(f"no pictures: {error}; install them with: pip install 'pneunet[pictures]'")
-    write_record(folder, design=str(design_path), model=model.name, pressures_kPa=[p * 1e3 for p in shapes],
-                 failed_kPa={plain(p * 1e3): why for p, why in failed.items()})
+    write_record(
+        folder,
+        design=str(design_path),
+        model=model.name,
+        pressures_kPa=[p * 1e3 for p in shapes],
+        failed_kPa={plain(p * 1e3): why for p, why in failed.items()},
+    )
     if failed:
         first = min(failed)
-        raise ConvergenceError(f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa")
+        raise ConvergenceError(
+            f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa"
+        )
     return folder
 
 
@@ -64,40 +73,56 @@ def _list(pressures):
 
 
 def _pictures(design, shapes, model, folder, say):
-    from design.bodies import body_mesh, edges, view_of
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
+    from design.bodies import body_mesh, view_of
 
     bodies = {p: body_mesh(design.manipulator, p, model, design.base_pose) for p in shapes}
     for p, body in bodies.items():
         with atomic_path(folder / f"body_{plain(p * 1e3)}kPa.vtp") as temporary:
             body.save(temporary)
-    highest = max(shapes)
-    view = view_of(np.vstack([body.points for body in bodies.values()]))
-    colours = {p: to_hex(colormaps["viridis_r"](0.1 + 0.85 * p / highest if highest else 0.5)) for p in bodies}
-    things = [thing for p, body in bodies.items() for thing in ((body, {"color": colours[p]}), edges(body))]
-    _picture_of_all(design, view, things, colours, folder / "bodies.png")
+    _picture_of_all(
+        design, view_of(np.vstack([body.points for body in bodies.values()])), bodies, folder / "bodies.png"
+    )
     say(f"bodies at every pressure: {folder / 'bodies.png'}")
+    highest = max(shapes)
     if highest > 0:
         _animation(design, highest, model, folder / "inflation.gif")
         say(f"inflation from 0 to {plain(highest * 1e3)} kPa: {folder / 'inflation.gif'}")
 
 
-def _picture_of_all(design, view, things, colours, path):
-    from design.bodies import body_figure, render
-    from design.pictures import save
-    from matplotlib.patches import Patch
+def _picture_of_all(design, view, bodies, path):
+    """One panel a pressure, same camera and scale."""
+    from design.bodies import painted, render, show
+    from design.pictures import figure, save
 
-    fig = body_figure(view, render(view, things), f"{design.name}: reduced model")
-    handles = [Patch(facecolor=colour, label=f"{plain(p * 1e3)} kPa") for p, colour in colours.items()]
-    fig.legend(handles=handles, loc="upper right", ncols=min(len(handles), 6), fontsize=8, frameon=False, bbox_to_anchor=(0.99, 0.945))
-    save(fig, path, dpi=130)
+    columns = min(len(bodies), 3)
+    rows = -(-len(bodies) // columns)
+    width, height = 5.0 * columns, 4.3 * rows + 0.5
+    fig = figure(width, height)
+    for number, (p, body) in enumerate(bodies.items()):
+        column, row = number % columns, number // columns
+        top = height - 0.5 - 4.3 * row
+        show(
+            fig.add_axes([5.0 * column / width, (top - 4.3) / height, 5.0 / width, 4.0 / height]),
+            view,
+            render(view, painted(body)),
+        )
+        fig.text(
+            (5.0 * column + 0.2) / width,
+            (top - 0.1) / height,
+            f"{plain(p * 1e3)} kPa",
+            fontsize=13,
+            weight="bold",
+            va="top",
+        )
+    fig.text(0.2 / width, 1 - 0.12 / height, f"{design.name}: reduced model", fontsize=16, weight="bold", va="top")
+    save(fig, path, dpi=90)
 
 
 def _animation(design, highest, model, path):
     """A GIF that inflates to `highest` (MPa) and holds; 24 frames of a few kB each."""
-    from design.bodies import body_mesh, edges, painted, render, view_of
     from PIL import Image, ImageDraw
+
+    from design.bodies import body_mesh, painted, render, view_of
 
     pressures = highest * np.linspace(0, 1, FRAMES)
     bodies = [body_mesh(design.manipulator, p, model, design.base_pose) for p in pressures]

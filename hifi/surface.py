@@ -49,3 +49,67 @@ def reference_areas(problem, facets):
 def split(facets):
     """(4 facets, 3) linear triangles of quadratic ones (facets, 6), same orientation."""
     return np.concatenate([facets[:, [0, 3, 5]], facets[:, [3, 1, 4]], facets[:, [5, 4, 2]], facets[:, [3, 4, 5]]])
+
+
+# degree-4 rule on the triangle (Dunavant 1985): exact for P2 shape functions times linear coordinates
+_A4, _B4 = 0.445948490915965, 0.091576213509771
+_BARYCENTRIC = np.array(
+    [[1 - 2 * a if i == j else a for i in range(3)] for a in (_A4, _B4) for j in range(3)]
+)
+_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
+
+
+def p2_shape(barycentric):
+    """(..., 6) quadratic shape functions at barycentric coordinates (..., 3); corners, then mid-edges 01, 12, 20."""
+    a, b, c = np.moveaxis(barycentric, -1, 0)
+    return np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=-1)
+
+
+def _clip(polygon, values, keep_below):
+    """The part of a barycentric polygon (n, 3) where corner `values` (3,), taken linearly, are <= 0 (or >= 0)."""
+    sign = 1.0 if keep_below else -1.0
+    out = []
+    for p, q in zip(polygon, np.roll(polygon, -1, axis=0)):
+        fp, fq = sign * p @ values, sign * q @ values
+        if fp <= 0:
+            out.append(p)
+        if fp * fq < 0:
+            out.append(p + fp / (fp - fq) * (q - p))
+    return np.array(out).reshape(-1, 3)
+
+
+class SlabIntegral:
+    """Exact integrals over the part of a surface with low <= X1 <= high, as weights on its nodes.
+
+    area (mm2); centre (3,) = int X dA; nodes (n,); weights (n,) = int N dA; first (n, 3) = int X N dA.
+    """
+
+    def __init__(self, problem, facets, low=-np.inf, high=np.inf):
+        X1 = problem.nodes[facets[:, :3], 0]
+        facets = facets[(X1.max(axis=1) > low) & (X1.min(axis=1) < high)]
+        corners = problem.nodes[facets[:, :3]]
+        areas = reference_areas(problem, facets)
+        nodes, inverse = np.unique(facets, return_inverse=True)
+        inverse = inverse.reshape(facets.shape)
+        self.nodes, self.area, self.centre = nodes, 0.0, np.zeros(3)
+        self.weights, self.first = np.zeros(len(nodes)), np.zeros((len(nodes), 3))
+        for row, triangle, area in zip(inverse, corners, areas):
+            polygon = np.eye(3)
+            if triangle[:, 0].min() < low:
+                polygon = _clip(polygon, triangle[:, 0] - low, keep_below=False)
+            if triangle[:, 0].max() > high:
+                polygon = _clip(polygon, triangle[:, 0] - high, keep_below=True)
+            for i in range(1, len(polygon) - 1):
+                part = polygon[[0, i, i + 1]]
+                points = _BARYCENTRIC @ part
+                w = _WEIGHTS * area * abs(np.linalg.det(part))
+                X, N = points @ triangle, p2_shape(points)
+                self.area += w.sum()
+                self.centre += w @ X
+                np.add.at(self.weights, row, w @ N)
+                np.add.at(self.first, row, np.einsum("q,qi,qn->ni", w, X, N))
+
+    def moments(self, positions):
+        """(16,) moments of the rigid fit from the undeformed surface to nodal `positions` (all local nodes, 3)."""
+        x = positions[self.nodes]
+        return np.concatenate([[self.area], self.centre, self.weights @ x, (self.first.T @ x).ravel()])

@@ -68,7 +68,7 @@ from petsc4py import PETSc
 import os, re
 PETSc.Vec().createSeq(1)
 maps = open("/proc/self/maps").read()
-files = re.findall(r"/.*/(?:libblas|libopenblas|libmkl_rt|libblis|libatlas)[^/]*$", maps, re.M)
+files = re.findall(r"/.*/(?:libblas|libopenblas|libmkl_rt|libblis|libatlas)[^/\n]*$", maps, re.M)
 print(*sorted({os.path.realpath(f) for f in files}))
 """
 COMPILE = (
@@ -113,7 +113,7 @@ def check_blas() -> Finding:
     ok, text = probe(BLAS)
     if not ok or not text:
         return Finding("BLAS", False, text or "no BLAS is loaded with PETSc", SETUP)
-    if all("/blas/libblas" in path for path in text.split()):
+    if any("/blas/libblas" in path for path in text.split()):
         fix = "apt-get install libopenblas0-serial; update-alternatives --auto libblas.so.3-$(gcc -print-multiarch)"
         return Finding("BLAS", False, f"{text} (reference BLAS, 4-5 times slower)", fix)
     return Finding("BLAS", True, text)

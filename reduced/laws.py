@@ -43,6 +43,29 @@ def panel(a):
     return g2 + h2 + f - 3, by_g[:, None] * d_g + by_h[:, None] * d_h, hessian
 
 
+def bulged_wall(a):
+    """Wall stretched by a1 and a2 along its edges and bulging out of its plane with slopes a3 and a4 along them.
+
+    tr C + 1/det C - 3 with C = [[a1^2 + a3^2, a3 a4], [a3 a4, a2^2 + a4^2]].
+    """
+    a1, a2, a3, a4 = a.T
+    det = (a1 * a2) ** 2 + (a1 * a4) ** 2 + (a2 * a3) ** 2
+    d_det = 2 * np.stack([a1 * (a2**2 + a4**2), a2 * (a1**2 + a3**2), a3 * a2**2, a4 * a1**2], axis=1)
+    zero = np.zeros_like(a1)
+    dd_det = np.array(
+        [
+            [2 * (a2**2 + a4**2), 4 * a1 * a2, zero, 4 * a1 * a4],
+            [4 * a1 * a2, 2 * (a1**2 + a3**2), 4 * a2 * a3, zero],
+            [zero, 4 * a2 * a3, 2 * a2**2, zero],
+            [4 * a1 * a4, zero, zero, 2 * a1**2],
+        ]
+    )
+    value = (a**2).sum(axis=1) + 1 / det - 3
+    outer = d_det[:, :, None] * d_det[:, None, :]
+    hessian = 2 * np.eye(4) - np.moveaxis(dd_det / det**2, 2, 0) + (2 / det**3)[:, None, None] * outer
+    return value, 2 * a - d_det / det[:, None] ** 2, hessian
+
+
 def product(a):
     """a1 a2 a3: a volume element."""
     a1, a2, a3 = a.T

@@ -34,7 +34,7 @@ class Centreline:
     def strains(self):
         """RodStrains of the n-1 intervals between samples."""
         relative = se3.inverse_pose(self.poses[:-1]) @ self.poses[1:]
-        return RodStrains.from_relative_pose(relative, np.diff(self.s)[:, None])
+        return RodStrains.from_relative_pose(relative, np.diff(self.s))
 
     @property
     def tangents(self):

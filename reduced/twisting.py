@@ -5,13 +5,12 @@ A tube of isotropic neo-Hookean matrix and one family of fibres along the chambe
   W = c1 mu/2 (I1 - 3) + c2 E_t/2 (sqrt(I4) - 1)^2.                                       (paper, Eqs 2-4)
 The three balances of Eqs 19-21 (radial equilibrium, capped ends, no torque) are the stationarity of
   Pi(ri, lambda, k) = 2 pi int W R dR - P pi (ri^2 lambda - Ri^2)
-per undeformed length. `printed_equations` is the paper's own form, which has no solution.
+per undeformed length. The paper's own form, which has no solution, is in reduced/printed.py.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from base.errors import InputError
 from reduced.equilibrium import follow
@@ -43,7 +42,9 @@ class TwistingTube:
 
     def __post_init__(self):
         if not 0 < self.inner_radius < self.outer_radius:
-            raise InputError(f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius = {self.outer_radius:g} mm")
+            raise InputError(
+                f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius = {self.outer_radius:g} mm"
+            )
         for name in ("mu", "fibre_modulus", "isotropic_fraction", "anisotropic_fraction"):
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} = {getattr(self, name):g} must be larger than 0")
@@ -87,7 +88,11 @@ class TubePotential:
     def volume(self, x):
         a, l, _ = x
         c = np.pi * self.tube.inner_radius**2
-        return c * a * a * l, c * np.array([2 * a * l, a * a, 0]), c * np.array([[2 * l, 2 * a, 0], [2 * a, 0, 0], [0, 0, 0]])
+        return (
+            c * a * a * l,
+            c * np.array([2 * a * l, a * a, 0]),
+            c * np.array([[2 * l, 2 * a, 0], [2 * a, 0, 0], [0, 0, 0]]),
+        )
 
     def energy(self, x):
         """Value, gradient (3,), Hessian (3, 3). I1 and I4 are rational in (rho = r^2, lambda, k), and rho in (a, lambda)."""
@@ -130,70 +135,3 @@ class TubePotential:
         hessian = np.einsum("ain,abn,bjn,n->ij", to_q, hq, to_q, self.weights) + dd_rho @ (gq[0] * self.weights)
         unit = np.array([1, 1, 1 / Ro])
         return value, gradient * unit, hessian * unit * unit[:, None]
-
-
-@dataclass(frozen=True)
-class PrintedResult:
-    """Best attempt at the paper's printed equations: residuals of Eqs 19, 20, 21 relative to P, P pi Ri^2, P pi Ri^3."""
-
-    solved: bool
-    unknowns: dict
-    residual: np.ndarray
-    starts: int
-
-    def __str__(self):
-        state = ", ".join(f"{k} = {v:.4g}" for k, v in self.unknowns.items())
-        head = "solution" if self.solved else f"no solution in the physical range ({self.starts} starts); least residual"
-        return f"{head}: |residual| = {np.linalg.norm(self.residual):.3g} at {state}"
-
-
-def printed_residual(tube, angle, pressure, tau, stretch, multiplier):
-    """Eqs 19-21 as printed (3,): uniform lambda_psi = lambda_z^-1/2, Eq. 11 without c1 mu lambda_psi^2, cos on the hoop.
-
-    `multiplier` stands where Eqs 10-12 print P.
-    """
-    hoop_stretch = stretch**-0.5
-    ri, ro = tube.inner_radius * hoop_stretch, tube.outer_radius * hoop_stretch
-    points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    r, w = (ro + ri) / 2 + (ro - ri) / 2 * points, (ro - ri) / 2 * weights
-    c1mu, c2E = tube.isotropic_fraction * tube.mu, tube.anisotropic_fraction * tube.fibre_modulus
-    sin, cos = np.sin(np.radians(angle)), np.cos(np.radians(angle))
-    shear = tau * r * stretch
-    along = hoop_stretch * cos + shear * sin
-    fibre = c2E * (1 - 1 / np.sqrt(along**2 + (stretch * sin) ** 2))
-    s_rr = -multiplier + c1mu / (stretch * hoop_stretch) ** 2
-    s_pp = -multiplier + c1mu * shear**2 + fibre * along**2
-    s_zz = -multiplier + c1mu * stretch**2 + fibre * (stretch * sin) ** 2
-    s_pz = stretch * (c1mu * shear + fibre * sin * along)
-    Ri, thrust = tube.inner_radius, pressure * np.pi * tube.inner_radius**2
-    return np.array(
-        [
-            (w @ ((s_pp - s_rr) / r) - pressure) / pressure,
-            (2 * np.pi * w @ (s_zz * r) - pressure * np.pi * ri**2) / thrust,
-            2 * np.pi * w @ (s_pz * r**2) / (thrust * Ri),
-        ]
-    )
-
-
-def printed_equations(tube, angle, pressure, multiplier="unknown", seed=0):
-    """Try to solve the paper's printed Eqs 5-21 and report; pressure > 0 in MPa, angle in degrees.
-
-    multiplier: 'unknown' takes the letter P in Eqs 10-12 for the constant multiplier p, one of the paper's three
-    unknowns; 'pressure' takes it literally. Least squares from many starting points over the physical range
-    (|tau| <= 0.2 rad/mm, 0.5 <= lambda <= 2.5, |p| <= 2 MPa).
-    """
-    low, high = np.array([-0.2, 0.5, -2.0]), np.array([0.2, 2.5, 2.0])
-    free = 3 if multiplier == "unknown" else 2
-    starts = low[:free] + (high - low)[:free] * np.random.default_rng(seed).random((60, free))
-
-    def residual(x):
-        return printed_residual(tube, angle, pressure, x[0], x[1], x[2] if free == 3 else pressure)
-
-    fits = [
-        least_squares(residual, x, bounds=(low[:free], high[:free]), x_scale=(high - low)[:free], xtol=1e-14, ftol=1e-14, gtol=1e-14)
-        for x in starts
-    ]
-    best = min(fits, key=lambda fit: fit.cost)
-    names = ("tau", "lambda_z", "p")[:free]
-    solved = bool(np.linalg.norm(best.fun) < 1e-8)
-    return PrintedResult(solved, dict(zip(names, best.x.tolist())), best.fun, len(starts))

@@ -28,7 +28,9 @@ def scaled_strains(manipulator, pressure, model):
     return tuple(RodStrains([s.e for s in group], [s.k for s in group]) for group in (pieces, each))
 
 
-def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, solve=True, fields=True):
+def make_run(
+    directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, solve=True, fields=True
+):
     """Fill `directory`; the solve ends at `reached` times the design pressure (MPa), one gap overlaps by `overlap` mm."""
     manipulator, model = Manipulator(segments), AnalyticModel()
     design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
@@ -42,7 +44,9 @@ def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1
     if not solve:
         return design
     (directory / "mesh").mkdir(exist_ok=True)
-    (directory / "mesh" / "mesh.json").write_text(json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}}))
+    (directory / "mesh" / "mesh.json").write_text(
+        json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}})
+    )
     _solve(directory / "solve", design, model, reached, overlap, fields)
     return design
 
@@ -52,23 +56,58 @@ def _solve(folder, design, model, reached, overlap, fields):
     manipulator = design.manipulator
     steps, centrelines, segments = [], [], []
     lengths = [length for _, length in manipulator.pieces]
-    for n, p in enumerate(design.pressure * reached * np.array([0.25, 0.5, 0.75, 1.0]), start=1):
+    for n, p in enumerate(design.pressure * reached * np.linspace(0, 1, 5)):
         pieces, each = scaled_strains(manipulator, p, model)
         line = centreline(lengths, pieces, spacing=3.0)
-        steps.append([n, p * 1e3, 4, 2, 900 + 4e3 * p, *line.points[-1], 1.5 - 60 * p, 1 + 5 * p, 1.5])
+        work = (4, 2) if n else (0, 0)
+        steps.append([n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 1 + 5 * p, 1.5 * n])
         centrelines += [[n, p * 1e3, s, *point] for s, point in zip(line.s, line.points)]
         segments += [[n, p * 1e3, i + 1, *each.e[i], *each.k[i]] for i in range(len(manipulator.segments))]
-    write_csv(folder / "steps.csv", ["step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm",
-                                     "tip_z_mm", "smallest_wall_distance_mm", "largest_stretch", "seconds"], steps)
-    write_csv(folder / "centrelines.csv", ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"], centrelines)
-    write_csv(folder / "segments.csv", ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"], segments)
-    walls = [[i + 1, side, gap, s.gap * (0.4 + 0.5 * gap / s.chambers)]
-             for i, s in enumerate(manipulator.segments) for side in s.sides for gap in range(1, s.chambers)]
+    walls = [
+        [i + 1, "top" if side > 0 else "bottom", gap, s.gap, s.gap * (0.4 + 0.5 * gap / s.chambers)]
+        for i, s in enumerate(manipulator.segments)
+        for side in s.sides
+        for gap in range(1, s.chambers)
+    ]
     if overlap:
-        walls[0][3] = -overlap
-    write_csv(folder / "walls.csv", ["segment", "side", "gap", "distance_mm"], walls)
-    (folder / "run.json").write_text(json.dumps({"command": "mpirun -n 2 pneunet solve design.toml", "ranks": 2, "dofs": 12345,
-                                                 "versions": {"dolfinx": "0.5.2"}, "status": "reached", "steps": [[1], [2]]}))
+        walls[0][4] = -overlap
+        steps[-1][8] = -overlap
+    write_csv(
+        folder / "steps.csv",
+        [
+            "step",
+            "pressure_kPa",
+            "iterations",
+            "factorisations",
+            "volume_mm3",
+            "tip_x_mm",
+            "tip_y_mm",
+            "tip_z_mm",
+            "smallest_wall_distance_mm",
+            "largest_stretch",
+            "seconds",
+        ],
+        steps,
+    )
+    write_csv(folder / "centrelines.csv", ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"], centrelines)
+    write_csv(
+        folder / "segments.csv",
+        ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"],
+        segments,
+    )
+    write_csv(folder / "walls.csv", ["segment", "side", "gap", "gap_mm", "distance_mm"], walls)
+    (folder / "run.json").write_text(
+        json.dumps(
+            {
+                "command": "mpirun -n 2 pneunet solve design.toml",
+                "ranks": 2,
+                "dofs": 12345,
+                "versions": {"dolfinx": "0.5.2"},
+                "status": "reached",
+                "steps": [[1], [2]],
+            }
+        )
+    )
     if fields:
         _fields(folder, manipulator, line)
 
@@ -79,7 +118,9 @@ def _fields(folder, manipulator, line):
 
     s0 = manipulator.segments[0]
     x = np.linspace(0, manipulator.length, 60)
-    grid = pyvista.RectilinearGrid(x, np.linspace(-s0.width / 2, s0.width / 2, 5), np.linspace(-2, 4, 4)).cast_to_unstructured_grid()
+    grid = pyvista.RectilinearGrid(
+        x, np.linspace(-s0.width / 2, s0.width / 2, 5), np.linspace(-2, 4, 4)
+    ).cast_to_unstructured_grid()
     rest = np.asarray(grid.points, float)
     poses = line.at(np.clip(rest[:, 0], 0, line.s[-1]))
     local = rest * [0, 1, 1]
