@@ -48,5 +48,10 @@ mkdir "$scratch/context"
     tar --null -T - -cf -) | tar -C "$scratch/context" -xf -
 
 say "building with $tool on $base"
+previous="$("$tool" images -q "$image" | head -n 1)"
 build_image "$base" "$scratch/context" "$image"
+# The image that lost its name to the new one; layers that the new one uses stay.
+if [ -n "$previous" ] && [ "$("$tool" images -q "$image" | head -n 1)" != "$previous" ]; then
+    "$tool" rmi "$previous" >/dev/null 2>&1 || true
+fi
 say "done: $image"

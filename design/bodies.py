@@ -1,4 +1,4 @@
-"""Pictures of bodies: VTK off-screen (no X needed), one view for all, framed by matplotlib with scale, axes and colour bar."""
+"""Pictures of bodies: VTK off-screen (no X needed), one view for all; matplotlib adds scale, axes and colour bar."""
 
 from dataclasses import dataclass
 
@@ -90,8 +90,9 @@ def painted(mesh):
     from matplotlib.colors import to_rgb
 
     mesh = mesh.copy()
-    colours = np.array([to_rgb(segment_colour(i - 1)) for i in mesh.cell_data["segment"]])
-    mesh.cell_data["colour"] = (255 * colours).astype(np.uint8)
+    segments = np.asarray(mesh.cell_data["segment"]) - 1
+    colours = np.array([to_rgb(segment_colour(i)) for i in range(segments.max() + 1)])
+    mesh.cell_data["colour"] = (255 * colours[segments]).astype(np.uint8)
     return [(mesh, {"scalars": "colour", "rgb": True, "preference": "cell"}), edges(mesh)]
 
 

@@ -42,16 +42,17 @@ class Comparison:
             difference = compare(run.centreline[1], reduced)
             if difference.hausdorff > 1e-3 * difference.reference_length:
                 notes.append(
-                    f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives for design.toml now: "
-                    "the design was edited, or predicted by another model; this report re-evaluates the analytic model."
+                    f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives for "
+                    "design.toml now: it was edited, or predicted by another model. The report shows the model's curve."
                 )
         if run.solve is not None:
             solved = se3.transform(design.base_pose, smooth(run.solve.s, run.solve.points))
             if stopped_short(run):
+                last = f"{plain(run.solve.pressure * 1e3)} kPa"
                 notes.append(
-                    f"The finite element solution stops at {plain(run.solve.pressure * 1e3)} kPa, below the design pressure of "
-                    f"{plain(design.pressure * 1e3)} kPa. It is compared with the reduced model re-evaluated at "
-                    f"{plain(run.solve.pressure * 1e3)} kPa; its distance to the target is that of a body not fully inflated."
+                    f"The finite element solution stops at {last}, below the design pressure of "
+                    f"{plain(design.pressure * 1e3)} kPa. It is compared with the reduced model at {last}; "
+                    "its distance to the target is that of a body not fully inflated."
                 )
             at_solve = _predict(design, run.solve.pressure, model, notes)
             if at_solve is not None:
@@ -123,8 +124,10 @@ def verdict(run, comparison):
         )
     if promise:
         sentence += f"; {promise}, the finite element body misses it by {_mm(c.solved_target)}"
+    elif c.solved_target:
+        sentence += f"; the finite element body misses the target by {_mm(c.solved_target)}"
     if stopped_short(run):
-        sentence += f" (it stopped short of the design pressure, {plain(design.pressure * 1e3)} kPa)"
+        sentence += f"; it stopped short of the design pressure, {plain(design.pressure * 1e3)} kPa"
     depth = overlap(run)
     if depth > 0:
         sentence += (

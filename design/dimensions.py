@@ -80,7 +80,7 @@ class SheetView:
         )
 
     def cut(self, solids, voids, colour, clip=None):
-        """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); the cut at `clip` x is a break."""
+        """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); broken off at the x of `clip`."""
         from matplotlib.patches import Rectangle
 
         def add(box, **style):
@@ -160,7 +160,7 @@ class SheetView:
         self.text(x - self.mm(0.06), (y0 + y1) / 2, text, ha="right")
 
     def ladder(self, intervals, x_part, x):
-        """Neighbouring vertical dimensions (y0, y1, text) in one column at x, their labels spread so that none overlap."""
+        """Neighbouring vertical dimensions (y0, y1, text) in one column at x, their labels spread apart."""
         middles = [(a + b) / 2 for a, b, _ in intervals]
         levels = spread(middles, self.mm(0.16))
         for y in {y for a, b, _ in intervals for y in (a, b)}:
@@ -192,7 +192,7 @@ class SheetView:
             self.text(level, y - self.mm(0.1), text, va="top", rotation=90, size=7)
 
     def angle(self, corner, degrees, radius):
-        """The angle between a line through `corner` and the x axis: extended line, arc of `radius` inches and its value."""
+        """The angle of a line through `corner` with the x axis: the line, an arc of `radius` inches and the value."""
         from matplotlib.patches import Arc
 
         corner, r = np.asarray(corner, float), self.mm(radius)

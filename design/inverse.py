@@ -25,8 +25,11 @@ PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)
 PAIRS = 101
 STEP = 1e-5  # of a variable's range, for differences
+INSET = 0.05  # of a variable's range: starts keep off the bounds, where the interior method crawls
 AT_BOUND = 1e-3  # of a variable's range
-STARTS = 2  # entries of the lookup table that are optimised
+PREFERENCE = 0.02  # mm of misfit per range that a dimension leaves its start by: decides where the target does not
+SPLIT_KEPT = 0.3  # a segment's number of chambers stays within this fraction of what its piece asks for
+GOOD_ENOUGH = 1.05  # cost of whole chambers over that of real-valued ones at which the search for others stops
 LEAST_PRESSURE = 0.002  # MPa
 
 #: start dimensions, mm, where they differ from Segment's own: castable and of the paper's magnitudes
@@ -48,6 +51,7 @@ RANGES = {
         "gap": ((2, 3), (2, 4)),
     },
 }
+UNITS = {"pressure": (" kPa", 1e3), "angle": (" deg", 1.0), "chambers": ("", 1.0)}
 ROUNDING = {"angle": 2}  # decimals; mm and everything else to 3
 
 
@@ -62,6 +66,7 @@ class Variable:
     high: float
     least: float
     most: float
+    start: float | None = None  # a dimension's preferred value
 
     @property
     def scale(self):
@@ -196,8 +201,7 @@ def solve(target, pieces, law, objective=PAIRED, say=print):
     if not guesses:
         raise ConvergenceError("the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker")
     say(f"lookup table: first guess at {1e3 * guesses[0].pressure:.1f} kPa, angles " + _angles(guesses[0].segments))
-    runs = [_Run.start(target, pieces, law, guess) for guess in guesses[:STARTS]]
-    run = min((r.optimised(real_counts=True) for r in runs), key=lambda r: r.cost)
+    run = _Run.start(target, pieces, law, guesses[0]).optimised(real_counts=True)
     if objective == EQ27:
         run = run.with_objective(EQ27).optimised(real_counts=True)
     say(f"real-valued optimum: {run.title}")
@@ -234,7 +238,7 @@ def _guesses(target, pieces, prototypes, law):
         angles.append(_grid(limits.get("angle"), 90.0, 5.0))
         heights.append(_grid(limits.get("chamber_height"), segment.chamber_height, 1.0))
     low, high = target.pressure_range or (0.010, PRESSURE_LIMIT)
-    pressures = np.linspace(low, high, max(1, round((high - low) / 0.005)) + 1) if high > low else np.array([low])
+    pressures = np.linspace(low, high, max(1, round((high - low) / 0.010)) + 1) if high > low else np.array([low])
     return first_guesses(pieces, prototypes, angles, heights, pressures, law)
 
 
@@ -266,13 +270,17 @@ class _Run:
         for i, (piece, segment) in enumerate(zip(pieces, guess.segments)):
             for name, ((low, high), (least, most)) in _limits(target, piece, segment).items():
                 value = float(np.clip(getattr(segment, name), low, high))
-                variables.append(Variable(name, i, value, low, high, least, most))
+                start = None if name == "angle" else float(np.clip(getattr(prototype(target, piece), name), low, high))
+                variables.append(Variable(name, i, value, low, high, least, most, start))
         if target.pressure_range is None:
             low, high = max(LEAST_PRESSURE, 0.6 * guess.pressure), min(PRESSURE_LIMIT, 1.4 * guess.pressure)
             variables.append(Variable("pressure", None, guess.pressure, low, high, LEAST_PRESSURE, PRESSURE_LIMIT))
         elif target.pressure_range[1] > target.pressure_range[0]:
             low, high = target.pressure_range
             variables.append(Variable("pressure", None, guess.pressure, low, high, low, high))
+        for i, n in enumerate(guess.counts):
+            low, high = max(1.0, (1 - SPLIT_KEPT) * n), (1 + SPLIT_KEPT) * n + 1
+            variables.append(Variable("chambers", i, n, low, high, low, high, n))
         variables = tuple(v for v in variables if v.high > v.low)
         turns = np.eye(3)[:, : 3 if target.base_direction is None else 1 if target.base_width is None else 0]
         problem = Problem(
@@ -280,11 +288,18 @@ class _Run:
         )
         return cls(problem, variables).turned_to_target()
 
+    def allows(self, counts):
+        """Whether numbers of chambers lie in their ranges, rounded outwards."""
+        ranges = {v.segment: (np.floor(v.low), np.ceil(v.high)) for v in self.variables if v.name == "chambers"}
+        return all(ranges[i][0] <= n <= ranges[i][1] for i, n in enumerate(counts))
+
     def with_objective(self, objective):
         return replace(self, problem=replace(self.problem, objective=objective))
 
     def with_counts(self, counts):
-        return replace(self, problem=replace(self.problem, counts=tuple(float(c) for c in counts)), cost=np.inf)
+        variables = tuple(replace(v, value=float(counts[v.segment])) if v.name == "chambers" else v for v in self.variables)
+        problem = replace(self.problem, counts=tuple(float(n) for n in counts))
+        return replace(self, problem=problem, variables=variables, cost=np.inf)
 
     def turned_to_target(self):
         """The base turned about its free axes to bring the present curve nearest to the target, in closed form."""
@@ -316,23 +331,20 @@ class _Run:
             run = replace(run, variables=variables, grown=tuple(dict.fromkeys(run.grown + tuple(names))))
 
     def _optimised_once(self, real_counts):
-        problem, variables = self.problem, self.variables
-        if real_counts:
-            counts = tuple(
-                Variable("chambers", i, n, 1.0, max(2.0, 3 * n), 1.0, max(2.0, 3 * n)) for i, n in enumerate(problem.counts)
-            )
-            variables = variables + counts
-        free = problem.turns.shape[1]
+        problem, free = self.problem, self.problem.turns.shape[1]
+        variables = tuple(v for v in self.variables if real_counts or v.name != "chambers")
         scale = np.array([v.scale for v in variables] + [1.0] * free)
         low = np.array([v.low for v in variables] + [-np.inf] * free)
         high = np.array([v.high for v in variables] + [np.inf] * free)
         calls = _Calls(problem, variables, scale, high)
+        inset = np.array([INSET * (v.high - v.low) for v in variables] + [0.0] * free)
         fit = least_squares(
-            calls.residual, np.clip(self._x(variables), low, high), calls.jacobian, (low, high), x_scale=scale,
-            xtol=1e-6, ftol=1e-5, gtol=1e-10, max_nfev=60,
+            calls.residual, np.clip(self._x(variables), low + inset, high - inset), calls.jacobian, (low, high), x_scale=scale,
+            xtol=1e-5, ftol=1e-3, gtol=1e-10, max_nfev=40,
         )  # fmt: skip
         trial = Trial(problem, variables, fit.x)
-        values = tuple(replace(v, value=float(value)) for v, value in zip(self.variables, fit.x))
+        found = dict(zip(variables, fit.x))
+        values = tuple(replace(v, value=float(found.get(v, v.value))) for v in self.variables)
         problem = replace(
             problem, prototypes=tuple(trial.segments), counts=tuple(trial.counts), pressure=trial.pressure, rotation=trial.rotation
         )
@@ -350,7 +362,7 @@ class _Run:
         """Rounded to what a drawing can say, with the cost there."""
         segments = []
         for i, (segment, count) in enumerate(zip(self.problem.prototypes, self.problem.counts)):
-            names = [v.name for v in self.variables if v.segment == i]
+            names = [v.name for v in self.variables if v.segment == i and v.name != "chambers"]
             rounded = {name: round(getattr(segment, name), ROUNDING.get(name, 3)) for name in names}
             segments.append(replace(segment, chambers=round(count), **rounded))
         pressure = round(self.problem.pressure, 6)
@@ -367,11 +379,14 @@ class _Calls:
     def __init__(self, problem, variables, scale, high):
         self.problem, self.variables, self.scale, self.high, self.count = problem, variables, scale, high, 0
         self.size = None
+        self.preferred = [i for i, v in enumerate(variables) if v.start is not None]
 
     def residual(self, x):
         self.count += 1
         try:
             out = self.problem.residual(Trial(self.problem, self.variables, x))
+            away = [(x[i] - self.variables[i].start) / self.scale[i] for i in self.preferred]
+            out = np.concatenate([out, PREFERENCE * np.array(away)])
         except ConvergenceError:
             if self.size is None:
                 raise
@@ -400,13 +415,14 @@ def _whole_chambers(run):
         return seen[counts]
 
     present = best(tuple(max(1, round(n)) for n in run.problem.counts))
-    while True:
+    while present.cost > GOOD_ENOUGH * run.cost:
         counts = tuple(round(n) for n in present.problem.counts)
-        around = [counts[:i] + (n + d,) + counts[i + 1 :] for i, n in enumerate(counts) for d in (-1, 1) if n + d >= 1]
-        candidate = min((best(c) for c in around), key=lambda r: r.cost)
+        around = [counts[:i] + (n + d,) + counts[i + 1 :] for i, n in enumerate(counts) for d in (-1, 1)]
+        candidate = min((best(c) for c in around if run.allows(c)), key=lambda r: r.cost, default=present)
         if candidate.cost > 0.99 * present.cost:
-            return present
+            break
         present = candidate
+    return present
 
 
 def _some_rotation(target):
@@ -421,6 +437,6 @@ def _some_rotation(target):
 
 
 def _active(variable):
-    unit, factor = ("kPa", 1e3) if variable.name == "pressure" else ("deg" if variable.name == "angle" else "mm", 1.0)
+    unit, factor = UNITS.get(variable.name, (" mm", 1.0))
     side = "lower" if variable.bound == variable.low else "upper"
-    return f"{variable.title} = {factor * variable.bound:g} {unit} ({side} bound)"
+    return f"{variable.title} = {factor * variable.bound:.4g}{unit} ({side} bound)"

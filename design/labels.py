@@ -1,5 +1,7 @@
 """Colours, names and number formats shared by every picture: the same thing looks the same everywhere."""
 
+import math
+
 from geometry.parameters import TWISTING
 
 TARGET, REDUCED, FINITE_ELEMENTS = "#30363d", "#1f6fb2", "#d9480f"
@@ -20,6 +22,14 @@ def plain(value, decimals=2):
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return "0" if text in ("-0", "") else text
+
+
+def significant(value, digits=4):
+    """A number of `digits` significant digits, never with an exponent: 193812.3 -> '193800', 0.01234 -> '0.01234'."""
+    if value == 0:
+        return "0"
+    decimals = digits - 1 - math.floor(math.log10(abs(value)))
+    return plain(round(value, decimals), max(decimals, 0))
 
 
 def segment_mode(segment):

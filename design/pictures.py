@@ -3,7 +3,7 @@
 import numpy as np
 
 from base.files import atomic_path
-from design.labels import STYLES, plain, segment_colour, segment_name
+from design.labels import STYLES, plain, segment_colour, segment_name, significant
 from design.rundata import read_run
 
 
@@ -118,9 +118,11 @@ def error_caption(errors):
         return f"{mm:.2f} mm ({errors.percent(mm):.1f} %)"
 
     return (
-        f"RMS paired by arc length {both(errors.rms)},  two-sided Hausdorff {both(errors.hausdorff)},  tip {both(errors.tip)}\n"
-        f"Eq. 27 sum over {errors.eq27_points} points {errors.eq27:.4g} mm²,  length {errors.length:.1f} mm, wanted "
-        f"{errors.reference_length:.1f} mm ({errors.percent(errors.length_mismatch):+.1f} %)    [% of the wanted length]"
+        f"RMS paired by arc length {both(errors.rms)},  two-sided Hausdorff {both(errors.hausdorff)},  "
+        f"tip {both(errors.tip)}\n"
+        f"Eq. 27 sum over {errors.eq27_points} points {significant(errors.eq27)} mm²,  "
+        f"length {errors.length:.1f} mm, wanted {errors.reference_length:.1f} mm "
+        f"({errors.percent(errors.length_mismatch):+.1f} %)    [% of the wanted length]"
     )
 
 
@@ -143,7 +145,8 @@ def draw_design(directory):
     fig.text(
         0.025,
         0.925,
-        f"{plain(design.pressure * 1e3)} kPa, {design.manipulator.chambers} chambers, {plain(design.manipulator.length, 1)} mm long at rest",
+        f"{plain(design.pressure * 1e3)} kPa, {design.manipulator.chambers} chambers, "
+        f"{plain(design.manipulator.length, 1)} mm long at rest",
         fontsize=10,
         va="top",
     )

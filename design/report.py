@@ -9,28 +9,44 @@ from base.record import revision
 from design import report_figures as figures
 from design.comparison import CONFIRMS, ROUGHLY, Comparison, overlap, stopped_short, verdict
 from design.drawing import draw_drawing, segment_table
-from design.labels import plain, segment_name
+from design.labels import plain, segment_name, significant
 from design.rundata import read_run
 from reduced.model import AnalyticModel
 
 STYLE = """
 :root { color-scheme: light; }
-body { font: 16px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: #1b1f24; background: #fff; margin: 0 auto; max-width: 1080px; padding: 1rem; }
-h1 { font-size: 1.7rem; margin: .5rem 0; } h2 { font-size: 1.2rem; border-bottom: 2px solid #dee2e6; margin-top: 2.2rem; padding-bottom: .2rem; }
+body {
+  font: 16px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: #1b1f24; background: #fff;
+  margin: 0 auto; max-width: 1080px; padding: 1rem;
+}
+h1 { font-size: 1.7rem; margin: .5rem 0; }
+h2 { font-size: 1.2rem; border-bottom: 2px solid #dee2e6; margin-top: 2.2rem; padding-bottom: .2rem; }
 .verdict { font-size: 1.1rem; border-left: 5px solid #1f6fb2; background: #eef5fb; padding: .7rem 1rem; }
-.alarm { border-left: 5px solid #c92a2a; background: #fff0f0; color: #861c1c; padding: .7rem 1rem; font-weight: 600; }
+.alarm {
+  border-left: 5px solid #c92a2a; background: #fff0f0; color: #861c1c; padding: .7rem 1rem; font-weight: 600;
+}
 .note { border-left: 5px solid #f08c00; background: #fff8eb; padding: .5rem 1rem; margin: .6rem 0; }
 .missing { color: #6b747d; font-style: italic; }
 .table { overflow-x: auto; margin: .8rem 0; }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e8ec; white-space: nowrap; }
-th { background: #f1f3f5; } th:first-child, td:first-child { text-align: left; } tr.head td { font-weight: 600; background: #f8f9fa; }
+th { background: #f1f3f5; }
+th:first-child, td:first-child { text-align: left; }
+tr.head td { font-weight: 600; background: #f8f9fa; }
 td.long { white-space: normal; text-align: left; word-break: break-word; }
 .grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: .8rem; }
-figure { margin: .8rem 0; } .grid figure { margin: 0; } img { width: 100%; height: auto; border: 1px solid #e4e8ec; } figcaption { font-size: .85rem; color: #4b545c; }
+figure { margin: .8rem 0; }
+.grid figure { margin: 0; }
+img { width: 100%; height: auto; border: 1px solid #e4e8ec; }
+figcaption { font-size: .85rem; color: #4b545c; }
 footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
-@media print { body { max-width: none; font-size: 11pt; padding: 0; } figure, tr, .verdict, .alarm { break-inside: avoid; } h2 { break-after: avoid; }
- .grid { grid-template-columns: repeat(3, 1fr); } .table { overflow: visible; } }
+@media print {
+  body { max-width: none; font-size: 11pt; padding: 0; }
+  figure, tr, .verdict, .alarm { break-inside: avoid; }
+  h2 { break-after: avoid; }
+  .grid { grid-template-columns: repeat(3, 1fr); }
+  .table { overflow: visible; }
+}
 """
 
 
@@ -57,9 +73,11 @@ def write_report(directory, say=print, model=None):
         f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections
     )
     page = (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(run.design.name)}: pneunet report</title><style>{STYLE}</style></head><body>{body}"
-        f"<footer>pneunet report, revision {escape(revision())}. Lengths in mm, pressures in kPa.</footer></body></html>\n"
+        f"<footer>pneunet report, revision {escape(revision())}. Lengths in mm, pressures in kPa.</footer>"
+        "</body></html>\n"
     )
     path = run.directory / "report.html"
     write_text(path, page)
@@ -70,7 +88,8 @@ def write_report(directory, say=print, model=None):
 
 def _image(folder, name, caption):
     data = base64.b64encode((Path(folder) / name).read_bytes()).decode()
-    return f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}"><figcaption>{escape(caption)}</figcaption></figure>'
+    told = escape(caption)
+    return f'<figure><img alt="{told}" src="data:image/png;base64,{data}"><figcaption>{told}</figcaption></figure>'
 
 
 def _grid(folder, pictures):
@@ -113,12 +132,12 @@ def _headline(run, comparison):
     out = f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b> {escape(designed)}</p>"
     out += f'<p class="verdict">{escape(verdict(run, comparison))}</p>'
     if overlap(run) > 0:
-        out += f'<p class="alarm">WALLS OVERLAP by up to {overlap(run):.2f} mm in the finite element solution (table below).</p>'
+        out += f'<p class="alarm">WALLS OVERLAP by up to {overlap(run):.2f} mm in the finite element solution.</p>'
     out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
     if c.reduced_solved:
         out += (
-            f'<p class="missing">"Confirms" means an RMS distance of at most {CONFIRMS:g} % of length, "roughly" at most {ROUGHLY:g} %, '
-            'beyond that "contradicts".</p>'
+            f'<p class="missing">"Confirms" means an RMS distance of at most {CONFIRMS:g} % of length, '
+            f'"roughly" at most {ROUGHLY:g} %, beyond that "contradicts".</p>'
         )
     return out
 
@@ -161,7 +180,7 @@ def _errors(comparison, run):
         ["two-sided Hausdorff distance"] + [both(e, e.hausdorff) for _, e in columns],
         ["tip distance"] + [both(e, e.tip) for _, e in columns],
         ["Eq. 27 (sum of squared nearest distances)"]
-        + [f"{e.eq27:.4g} mm² over {e.eq27_points} points" for _, e in columns],
+        + [f"{significant(e.eq27)} mm² over {e.eq27_points} points" for _, e in columns],
         ["length mismatch"] + [both(e, e.length_mismatch, "+") for _, e in columns],
         ["lengths"] + [f"{e.length:.2f} mm vs {e.reference_length:.2f} mm" for _, e in columns],
     ]
@@ -191,7 +210,8 @@ def _strains(run, comparison):
             rows.append([label, told, _fixed(fe, digits), ratio])
     return (
         _table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
-        + "<p>Strains refer to the section frame on the channel axis. |k| and k.e of a uniform screw do not depend on that choice.</p>"
+        + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not depend on "
+        "that choice.</p>"
     )
 
 
@@ -212,8 +232,8 @@ def _walls(run, folder):
     depth = overlap(run)
     if depth > 0:
         out = (
-            f'<p class="alarm">WALLS OVERLAP in {sum(d < 0 for *_, d in run.solve.walls)} of {len(run.solve.walls)} gaps, by up to '
-            f"{depth:.2f} mm. Contact is not part of this solution; a real body would be stopped by it.</p>"
+            f'<p class="alarm">WALLS OVERLAP in {sum(d < 0 for *_, d in run.solve.walls)} of {len(run.solve.walls)} '
+            f"gaps, by up to {depth:.2f} mm. Contact is not part of this solution; a real body would be stopped.</p>"
         )
     else:
         out = f"<p>No walls touch: the smallest distance is {min(d for *_, d in run.solve.walls):.2f} mm.</p>"

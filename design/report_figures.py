@@ -86,7 +86,7 @@ def body_pictures(run, comparison, model, folder):
         )
         for name, field, label, cmap in (
             ("fe_displacement.png", "displacement length", "displacement (mm)", "viridis"),
-            ("fe_stretch.png", "stretch", "largest principal stretch (-)", "inferno"),
+            ("fe_stretch.png", "stretch", "largest principal stretch (-)", "YlOrRd"),
         ):
             if field not in solved.point_data:
                 continue
@@ -171,7 +171,7 @@ def history_picture(run, model, folder):
 
 
 def wall_picture(run, folder):
-    """Plan strips of the manipulator, upper and lower side, every gap coloured by the smallest distance of its walls."""
+    """Plan strips of the upper and the lower side, every gap coloured by the smallest distance of its walls."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import TwoSlopeNorm
     from matplotlib.patches import Polygon
@@ -243,7 +243,7 @@ def wall_picture(run, folder):
     return [
         (
             "walls.png",
-            "Plan of the body at rest (x in mm), every gap coloured by the smallest distance of its walls in the last step. "
+            "Plan of the body at rest (x in mm), gaps coloured by the smallest distance of their walls, last step. "
             "Red triangles mark overlap.",
         )
     ]

@@ -47,7 +47,8 @@ def run_shape(design_path, pressures, directory, say=print, model=None):
     for p, line in shapes.items():
         tip = line.points[-1]
         say(
-            f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm"
+            f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, "
+            f"tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm"
         )
     try:
         _pictures(design, shapes, model, folder, say)

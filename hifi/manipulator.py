@@ -14,8 +14,8 @@ from base.record import write_record
 from geometry import cad
 from hifi import compat
 from hifi.output import FieldWriter
-from hifi.path import PressurePath
-from hifi.problem import MixedProblem
+from hifi.path import LoadPath
+from hifi.problem import MixedProblem, Support
 from hifi.rod_coordinates import RodCoordinates
 from hifi.sections import SectionFrames
 from hifi.solver import Newton
@@ -51,12 +51,12 @@ class ManipulatorSolve:
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
         self.problem = MixedProblem(
-            mesh, cell_tags, facet_tags, materials, (cad.CAVITY, cad.CHANNEL), [(cad.BASE, None)]
+            mesh, cell_tags, facet_tags, materials, (cad.CAVITY, cad.CHANNEL), [Support(cad.BASE)]
         )
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
         coordinates = RodCoordinates(self.problem.nodes, self.problem.owned_nodes, comm, spacing)
         self.newton = Newton(self.problem, coordinates, newton_options)
-        self.path = PressurePath(self.newton)
+        self.path = LoadPath(self.newton)
         self.sections = SectionFrames(self.problem, manipulator)
         self.walls = WallDistances(self.problem, manipulator)
         self.stretch = PrincipalStretch(self.problem)

@@ -5,9 +5,13 @@ follower load P inner(J inv(F).T N, v) on the cavity surface. Volume forms are i
 facets with degree 4, which is exact for the latter on straight-sided cells, so that the load tangent is symmetric.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from hifi import compat
@@ -17,14 +21,26 @@ VOLUME_DEGREE = 4
 PRESSURE_DEGREE = 4
 
 
+@dataclass(frozen=True)
+class Support:
+    """Prescribed displacement on tagged facets.
+
+    component: 0..2, or None for all three. motion(X (n, 3), load) -> (n,) or (n, 3) in mm; None keeps it at zero.
+    """
+
+    tag: int
+    component: int | None = None
+    motion: Callable | None = None
+
+
 class MixedProblem:
     """A body, its materials, its clamps and one follower pressure.
 
     mesh, cell_tags, facet_tags: as dolfinx gives them. materials: {cell tag: base.materials law}, or one law.
-    pressure_tags: facet tags of the loaded surface. fixed: list of (facet tag, component 0..2 or None for all).
+    pressure_tags: facet tags of the loaded surface (none: no pressure). supports: list of `Support`.
     """
 
-    def __init__(self, mesh, cell_tags, facet_tags, materials, pressure_tags, fixed):
+    def __init__(self, mesh, cell_tags, facet_tags, materials, pressure_tags, supports):
         self.mesh, self.facet_tags = mesh, facet_tags
         self.space = compat.mixed_space(mesh)
         self.state = fem.Function(self.space)
@@ -36,7 +52,11 @@ class MixedProblem:
         self.nodes = displacement_space.tabulate_dof_coordinates()[: len(self.displacement_dofs)].copy()
         pressure_space, to_mixed_p = self.space.sub(1).collapse()
         self.pressure_space, self.pressure_dofs = pressure_space, np.asarray(to_mixed_p)
-        self.bcs = [self._clamp(tag, component) for tag, component in fixed]
+        self.supports = list(supports)
+        self.bcs = [self._support_condition(support) for support in self.supports]
+        #: supported dofs of the mixed vector: those this rank sees, and those it owns
+        self.fixed_dofs = np.unique(np.concatenate([bc.dof_indices()[0] for bc in self.bcs] + [np.zeros(0, np.int32)]))
+        self._fixed_owned = self.fixed_dofs[self.fixed_dofs < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
         self.pressure = fem.Constant(mesh, PETSc.ScalarType(0.0))
 
         u, p = ufl.split(self.state)
@@ -74,14 +94,30 @@ class MixedProblem:
         constants = {n: fem.Constant(self.mesh, PETSc.ScalarType(getattr(material, n))) for n in PARAMETERS[material.law]}
         return ENERGIES[material.law](constants, F)
 
-    def _clamp(self, tag, component):
-        facets = self.facet_tags.find(tag)
-        where = self.space.sub(0) if component is None else self.space.sub(0).sub(component)
+    def _support_condition(self, support):
+        facets = self.facet_tags.find(support.tag)
+        where = self.space.sub(0) if support.component is None else self.space.sub(0).sub(support.component)
         collapsed, _ = where.collapse()
-        zero = fem.Function(collapsed)
-        zero.x.array[:] = 0.0
         dofs = fem.locate_dofs_topological((where, collapsed), self.mesh.topology.dim - 1, facets)
-        return fem.dirichletbc(zero, dofs, where)
+        value = fem.Function(collapsed)
+        return fem.dirichletbc(value, dofs, where)
+
+    def supported(self, array, load):
+        """`array` with the supported displacements set to their values at this load."""
+        for support, bc in zip(self.supports, self.bcs):
+            dofs = bc.dof_indices()[0]
+            if support.motion is None:
+                array[dofs] = 0.0
+                continue
+            chosen = np.isin(self.displacement_dofs, dofs)
+            moved = np.zeros(self.displacement_dofs.shape)
+            motion = support.motion(self.nodes, load)
+            if support.component is None:
+                moved[:] = motion
+            else:
+                moved[:, support.component] = motion
+            array[self.displacement_dofs[chosen]] = moved[chosen]
+        return array
 
     # ---- state as one array (owned and ghost dofs of the mixed space)
     @property
@@ -113,17 +149,40 @@ class MixedProblem:
             local.set(0.0)
         fem.petsc.assemble_vector(b, form)
         b.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        # fixed values are zero and stay zero: the residual there is zero too
-        fem.petsc.set_bc(b, self.bcs, scale=0.0)
         return b
 
-    def internal_force(self):
-        """PETSc vector (N): internal force and incompressibility defect (mm3) at the current state."""
-        return self._assemble("internal", self._internal)
+    def residual(self, pressure):
+        """(PETSc vector in N and mm3, norm of what it balances in N) at the current state.
+
+        The scale is the larger of the pressure load's and the support reactions' norm; supported entries are zero.
+        """
+        r = self._assemble("internal", self._internal)
+        scale = 0.0
+        if pressure:
+            load = self.load_force()
+            r.axpy(pressure, load)
+            scale = abs(pressure) * load.norm()
+        reactions = r.array[self._fixed_owned]
+        scale = max(scale, np.sqrt(self._sum(reactions @ reactions)))
+        r.array[self._fixed_owned] = 0.0
+        return r, scale
 
     def load_force(self):
-        """PETSc vector (mm2): residual per unit of cavity pressure at the current state, -dV/du."""
-        return self._assemble("load", self._load)
+        """PETSc vector (mm2): residual per unit of cavity pressure at the current state, -dV/du; zero at supports."""
+        b = self._assemble("load", self._load)
+        b.array[self._fixed_owned] = 0.0
+        return b
+
+    def reaction(self, tag, pressure, point=(0.0, 0.0, 0.0)):
+        """(force (3,) in N, moment (3,) in N mm about `point`) with which the tagged support holds the body."""
+        r = self._assemble("internal", self._internal)
+        if pressure:
+            r.axpy(pressure, self._assemble("load", self._load))
+        nodes = fem.locate_dofs_topological(self.displacement_space, 2, self.facet_tags.find(tag))
+        nodes = nodes[nodes < self.owned_nodes]
+        force = r.array[self.displacement_dofs[nodes]]
+        arm = self.nodes[nodes] + self.displacement()[nodes] - np.asarray(point)
+        return self._sum(force.sum(axis=0)), self._sum(np.cross(arm, force).sum(axis=0))
 
     def create_tangent(self):
         A = fem.petsc.create_matrix(self._tangent)
@@ -138,18 +197,16 @@ class MixedProblem:
         A.assemble()
         return A
 
-    def _scalar(self, form):
-        from mpi4py import MPI
-
-        return self.mesh.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
+    def _sum(self, value):
+        return self.mesh.comm.allreduce(value, op=MPI.SUM)
 
     def cavity_volume(self):
         """Volume (mm3) of the closed cavity."""
-        return float(self._scalar(self._volume))
+        return float(self._sum(fem.assemble_scalar(self._volume)))
 
     def stored_energy(self):
         """Elastic energy (N mm)."""
-        return float(self._scalar(self._energy))
+        return float(self._sum(fem.assemble_scalar(self._energy)))
 
     def destroy(self):
         for vector in self._vectors.values():

@@ -11,6 +11,10 @@ class NotConverged(RuntimeError):
     """This solve failed; the stepper decides what to try next."""
 
 
+class PredictorTooFar(NotConverged):
+    """The predicted state is further from equilibrium than what failed before: not worth a factorisation."""
+
+
 class DirectSolver:
     """MUMPS factorisation of the problem's tangent: LDL^T when symmetric (a closed cavity), LU otherwise."""
 
@@ -83,8 +87,7 @@ class Newton:
         self.solver = DirectSolver(self.tangent, problem.mesh.comm)
         self.factorised_at = None
         self._increment = problem.state.copy()
-        self._residual = problem.internal_force().duplicate()
-        self._turned = self._residual.duplicate()
+        self._turned = self.tangent.createVecRight()
         self.timings = {"residual": 0.0, "tangent": 0.0, "factorise": 0.0, "solve": 0.0}
 
     def factorise(self, pressure):
@@ -121,14 +124,12 @@ class Newton:
         return solution
 
     def residual(self, pressure):
-        """(residual vector, its norm, norm of the pressure load alone)."""
+        """(residual vector, its norm, norm of the forces it balances)."""
         t = perf_counter()
-        load = self.problem.load_force()
-        self.problem.internal_force().copy(self._residual)
-        self._residual.axpy(pressure, load)
-        norms = self._residual.norm(), abs(pressure) * load.norm()
+        r, scale = self.problem.residual(pressure)
+        norm = r.norm()
         self.timings["residual"] += perf_counter() - t
-        return self._residual, *norms
+        return r, norm, scale
 
     def load_direction(self):
         """d(state)/d(pressure) with the factorised tangent, as an array over owned and ghost dofs."""
@@ -141,17 +142,13 @@ class Newton:
         return self._increment.x.array.copy()
 
     def move(self, array, increment):
-        """State array after an increment: displacement retracted, pressure added, fixed values kept."""
+        """State array after an increment: displacement retracted, pressure added, supported values kept."""
         dofs, nodes = self.problem.displacement_dofs, self.coordinates.nodes
         moved = array + increment
         moved[dofs] = self.coordinates.retract(nodes + array[dofs], increment[dofs]) - nodes
-        return self.keep_fixed(moved)
-
-    def keep_fixed(self, array):
-        for bc in self.problem.bcs:
-            indices, _ = bc.dof_indices()
-            array[indices] = 0.0
-        return array
+        fixed = self.problem.fixed_dofs
+        moved[fixed] = array[fixed]
+        return moved
 
     def solve(self, pressure):
         """Iterate from the current state to equilibrium at `pressure` (MPa); NotConverged otherwise."""
@@ -178,7 +175,6 @@ class Newton:
     def destroy(self):
         self.solver.destroy()
         self.tangent.destroy()
-        self._residual.destroy()
         self._turned.destroy()
         self.problem.destroy()
 

@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass, field
 
 from base.errors import ConvergenceError
-from hifi.solver import NotConverged
+from hifi.solver import NotConverged, PredictorTooFar
 
 
 @dataclass
@@ -74,6 +74,9 @@ def run_steps(path, target, size, on_step=lambda step: None):
         attempted = load - path.load
         try:
             iterations, factorisations, residual = path.advance(load)
+        except PredictorTooFar:
+            step = 0.75 * attempted
+            continue
         except NotConverged as error:
             result.failures.append((load, str(error)))
             step = attempted * size.cutback_factor

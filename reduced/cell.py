@@ -60,6 +60,9 @@ class CellKinematics:
         self.core_height = s.core_top - s.core_bottom
         self.xi = s.sin * np.array([1.0, -s.cot])
         self.eta = s.sin * np.array([s.cot, 1.0])
+        axes = ((self.xi, self.xi), (self.eta, self.xi), (self.xi, self.eta), (self.eta, self.eta))
+        # (A11, A12, A22) to the components a.A.b in the axes (xi, eta)
+        self.plan = np.array([[a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[1] * b[1]] for a, b in axes])
         self.share = s.cavity_thickness / (s.chamber_thickness + s.gap)  # of the pitch, under the cavity
         self.foot = s.core_top
         self.wall_height = s.cavity_top + s.top_wall / 2 - self.foot  # free height, to the top wall's middle
@@ -86,16 +89,11 @@ class CellKinematics:
         return rows
 
     def gradient(self, z, shapes, part):
-        """F in the axes (xi, eta): A(z) and `part` of the opening and sliding; rows (n, m, 4, SIZE) of F11, F21, F12, F22."""
+        """F = A(z) + `part` of opening and sliding, in axes (xi, eta): rows (n, m, 4, SIZE) of F11, F21, F12, F22."""
         Z = np.asarray(z, float)[:, None] / self.core_height
         out = np.zeros(Z.shape[:1] + shapes.shape[1:] + (4, SIZE))
-        for row, (a, b) in enumerate(
-            ((self.xi, self.xi), (self.eta, self.xi), (self.xi, self.eta), (self.eta, self.eta))
-        ):
-            for i, j, ij in ((0, 0, "11"), (0, 1, "12"), (1, 1, "22")):
-                both = a[i] * b[j] + (a[j] * b[i] if i != j else 0.0)
-                out[..., row, INDEX["M" + ij]] = both * shapes[0]
-                out[..., row, INDEX["K" + ij]] = both * Z * shapes[0]
+        out[..., INDEX["M11"] : INDEX["M22"] + 1] = shapes[0][:, None, None] * self.plan
+        out[..., INDEX["K11"] : INDEX["K22"] + 1] = (Z * shapes[0])[..., None, None] * self.plan
         out[..., 0, :] += part * (self.chamber("alpha", shapes) + Z[..., None] * self.chamber("beta", shapes))
         out[..., 1, INDEX["gamma"]] += part * shapes[0]
         out[..., 1, INDEX["delta"]] += part * Z * shapes[0]
@@ -114,7 +112,7 @@ class CellKinematics:
         return self.gradient(z, self.end[0], 1 - self.share)[:, 0, 1]
 
     def sliding(self, z):
-        """Sliding at heights z: above the foot linear up to the top wall's own, as the long walls shear in their planes."""
+        """Sliding at heights z: above the foot linear up to the top wall's, as the long walls shear in their planes."""
         x = ((z - self.foot) / self.wall_height)[:, None]
         free = (1 - x) * self.plane_sliding([self.foot]) + x * self.section("slide")
         return np.where(x > 0, free, self.plane_sliding(z))

@@ -11,7 +11,7 @@ from base.errors import ConvergenceError
 
 TOLERANCE = 1e-11  # of the gradient, against the potential's scale
 SMALLEST_STEP = 1e-4  # of the pressure asked for
-LARGEST_UPDATE = 0.3  # of a scaled unknown in one Newton step
+LARGEST_UPDATE = 0.5  # of a scaled unknown in one Newton step
 
 
 def _minimise(potential, x, pressure, iterations=30):
@@ -23,12 +23,12 @@ def _minimise(potential, x, pressure, iterations=30):
             return None
         converged = abs(gradient).max() <= TOLERANCE * potential.scale
         try:
-            factor = np.linalg.cholesky(hessian)
+            np.linalg.cholesky(hessian)
         except np.linalg.LinAlgError:
             return None
         if converged:
             return x
-        step = -np.linalg.solve(factor.T, np.linalg.solve(factor, gradient))
+        step = -np.linalg.solve(hessian, gradient)
         if abs(step).max() > LARGEST_UPDATE:
             return None
         x = x + step
@@ -56,8 +56,9 @@ def follow(potential, pressures):
             step = (trial - reached) / 2
             if step < SMALLEST_STEP * pressure:
                 raise ConvergenceError(
-                    f"{potential.name}: no stable equilibrium beyond {reached * 1e3:.4g} kPa (asked for {pressure * 1e3:.4g} "
-                    "kPa): a limit load of this model; lower the pressure or make the walls thicker"
+                    f"{potential.name}: no stable equilibrium beyond {reached * 1e3:.4g} kPa "
+                    f"(asked for {pressure * 1e3:.4g} kPa): a limit load of this "
+                    "model; lower the pressure or make the walls thicker"
                 )
         states.append(x)
     return np.array(states).reshape(len(states), potential.start.size)

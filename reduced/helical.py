@@ -8,6 +8,8 @@ The paper's own model stood in its lost supplement; this one is ours, derived in
 Rod strains of the channel axis: e = (M11, M12, 0), k = (-K12, K11, 0).
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from base.errors import InputError
@@ -19,9 +21,12 @@ from reduced.laws import bulged_wall, membrane, panel, product
 GAUSS_POINTS, ALONG_POINTS = 4, 5
 
 
+_rule = lru_cache(np.polynomial.legendre.leggauss)
+
+
 def _gauss(low, high, n=GAUSS_POINTS):
     """Points and weights on low..high; weights vanish where the interval is empty."""
-    points, weights = np.polynomial.legendre.leggauss(n)
+    points, weights = _rule(n)
     length = max(high - low, 0.0)
     return low + length * (1 + points) / 2, length * weights / 2
 
@@ -39,8 +44,8 @@ class HelicalCell:
             raise InputError(f"kind = '{segment.kind}': the helical model is for 'one-sided' segments")
         if segment.cavity_top <= segment.core_top:
             raise InputError(
-                f"chamber_height_mm = {segment.chamber_height:g}: the cavity's top must lie above the core (z = {segment.core_top:g} "
-                "mm) for the analytic model"
+                f"chamber_height_mm = {segment.chamber_height:g}: the cavity's top must lie above the core "
+                f"(z = {segment.core_top:g} mm) for the analytic model"
             )
         s = self.segment = segment
         self.cell = CellKinematics(s)

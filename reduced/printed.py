@@ -19,7 +19,7 @@ MULTIPLIERS = ("unknown", "pressure")
 
 @dataclass(frozen=True)
 class PrintedResult:
-    """Best attempt at the paper's printed equations: residuals of Eqs 19, 20, 21 relative to P, P pi Ri^2, P pi Ri^3."""
+    """Best attempt at the printed equations; residual of Eqs 19, 20, 21 relative to P, P pi Ri^2, P pi Ri^3."""
 
     solved: bool
     unknowns: dict
@@ -35,7 +35,7 @@ class PrintedResult:
 
 
 def printed_residual(tube, angle, pressure, tau, stretch, multiplier):
-    """Eqs 19-21 as printed (3,): uniform lambda_psi = lambda_z^-1/2, Eq. 11 without c1 mu lambda_psi^2, cos on the hoop.
+    """Eqs 19-21 as printed (3,): lambda_psi = lambda_z^-1/2, Eq. 11 without c1 mu lambda_psi^2, cos on the hoop.
 
     `multiplier` stands where Eqs 10-12 print P.
     """

@@ -27,7 +27,7 @@ GAUSS_POINTS = 12
 
 @dataclass(frozen=True)
 class TwistingTube:
-    """inner_radius, outer_radius: Ri, Ro in mm; mu: matrix shear modulus, MPa; fibre_modulus: E_t, MPa; fractions c1, c2.
+    """inner_radius, outer_radius: Ri, Ro in mm; mu, fibre_modulus: shear modulus and E_t in MPa; fractions c1, c2.
 
     fibre_convention: 'axial' (A = (cos, sin) on (Z, Psi)) or 'hoop' (A = (sin, cos)).
     """
@@ -52,7 +52,7 @@ class TwistingTube:
             raise InputError(f"fibre_convention = '{self.fibre_convention}' is not known: write 'axial' or 'hoop'")
 
     def solve(self, angle, pressure):
-        """Deformed inner radius ri (mm), stretch lambda_z and tau (rad per mm of deformed length), each shaped as pressure.
+        """(ri, lambda_z, tau): inner radius in mm, stretch, rad per mm of deformed length; each shaped as pressure.
 
         angle in degrees; pressure in MPa, a number or an array. ConvergenceError beyond the limit load.
         """
@@ -86,43 +86,43 @@ class TubePotential:
         return x[0] > 0.1 and x[1] > 0.1
 
     def volume(self, x):
-        a, l, _ = x
+        a, lz, _ = x
         c = np.pi * self.tube.inner_radius**2
         return (
-            c * a * a * l,
-            c * np.array([2 * a * l, a * a, 0]),
-            c * np.array([[2 * l, 2 * a, 0], [2 * a, 0, 0], [0, 0, 0]]),
+            c * a * a * lz,
+            c * np.array([2 * a * lz, a * a, 0]),
+            c * np.array([[2 * lz, 2 * a, 0], [2 * a, 0, 0], [0, 0, 0]]),
         )
 
     def energy(self, x):
-        """Value, gradient (3,), Hessian (3, 3). I1 and I4 are rational in (rho = r^2, lambda, k), and rho in (a, lambda)."""
+        """Value, gradient (3,) and Hessian (3, 3): by (rho = r^2, lambda, k) first, with rho of (a, lambda)."""
         t, R2 = self.tube, self.R**2
         Ri2, Ro = t.inner_radius**2, t.outer_radius
-        a, l, k = x[0], x[1], x[2] / Ro
+        a, lz, k = x[0], x[1], x[2] / Ro
         b = R2 - Ri2
-        rho = Ri2 * a * a + b / l
+        rho = Ri2 * a * a + b / lz
         one, zero = np.ones_like(R2), np.zeros_like(R2)
         # derivatives of rho by (a, lambda, k)
-        d_rho = np.array([2 * Ri2 * a * one, -b / l**2, zero])
+        d_rho = np.array([2 * Ri2 * a * one, -b / lz**2, zero])
         dd_rho = np.zeros((3, 3) + R2.shape)
-        dd_rho[0, 0], dd_rho[1, 1] = 2 * Ri2, 2 * b / l**3
+        dd_rho[0, 0], dd_rho[1, 1] = 2 * Ri2, 2 * b / lz**3
         # I1 and I4 by q = (rho, lambda, k), then by x: q depends on x through rho alone
         to_q = np.array([d_rho, [zero, one, zero], [zero, zero, one]])
-        radial = R2 / (rho * l * l)
-        I1 = radial + rho / R2 + rho * k * k + l * l
-        g1 = np.array([-radial / rho + 1 / R2 + k * k, -2 * radial / l + 2 * l, 2 * rho * k])
+        radial = R2 / (rho * lz * lz)
+        I1 = radial + rho / R2 + rho * k * k + lz * lz
+        g1 = np.array([-radial / rho + 1 / R2 + k * k, -2 * radial / lz + 2 * lz, 2 * rho * k])
         h1 = np.array(
             [
-                [2 * radial / rho**2, 2 * radial / (rho * l), 2 * k * one],
-                [2 * radial / (rho * l), 6 * radial / l**2 + 2, zero],
+                [2 * radial / rho**2, 2 * radial / (rho * lz), 2 * k * one],
+                [2 * radial / (rho * lz), 6 * radial / lz**2 + 2, zero],
                 [2 * k * one, zero, 2 * rho],
             ]
         )
         # fibre: I4 = rho (hoop/R + k axial)^2 + (lambda axial)^2
         s, c = self.hoop / self.R, self.axial
         m = s + k * c
-        I4 = rho * m * m + (l * c) ** 2
-        g4 = np.array([m * m, 2 * l * c * c * one, 2 * rho * m * c])
+        I4 = rho * m * m + (lz * c) ** 2
+        g4 = np.array([m * m, 2 * lz * c * c * one, 2 * rho * m * c])
         h4 = np.array([[zero, zero, 2 * m * c], [zero, 2 * c * c * one, zero], [2 * m * c, zero, 2 * rho * c * c]])
         root = np.sqrt(I4)
         iso, fibre = t.isotropic_fraction * t.mu / 2, t.anisotropic_fraction * t.fibre_modulus / 2

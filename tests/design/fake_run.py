@@ -1,5 +1,5 @@
-"""A run directory as the commands leave it, small and consistent: the "finite elements" are the reduced model with every
-strain (departure from rest) times `FACTOR`, so the report's numbers can be foreseen."""
+"""A run directory as the commands leave it, small and consistent: the "finite elements" are the reduced model with
+every strain (departure from rest) times `FACTOR`, so the report's numbers can be foreseen."""
 
 import json
 
@@ -31,7 +31,7 @@ def scaled_strains(manipulator, pressure, model):
 def make_run(
     directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, solve=True, fields=True
 ):
-    """Fill `directory`; the solve ends at `reached` times the design pressure (MPa), one gap overlaps by `overlap` mm."""
+    """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap` mm."""
     manipulator, model = Manipulator(segments), AnalyticModel()
     design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
     directory.mkdir(parents=True, exist_ok=True)

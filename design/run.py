@@ -1,0 +1,136 @@
+"""`pneunet design`: from a target file to a folder with a design, its prediction and its errors."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy
+
+from base.errors import InputError
+from base.files import output_directory, write_csv
+from base.record import write_record
+from design.extraction import extract
+from design.inverse import OBJECTIVES, PAIRED, solve
+from design.metrics import compare
+from design.segmentation import NOTE, split
+from design.targets import POINT_COLUMNS, read_target
+from geometry.designfile import Design, write_design
+from geometry.parameters import TWISTING as TWISTING_KIND
+from reduced.model import AnalyticModel, predict
+
+GIVEN_NOTE = "split as given"
+
+
+def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
+    """Design a manipulator for the target in a CSV or TOML file; returns the `Design`.
+
+    law: a SegmentLaw, by default the AnalyticModel. objective: 'paired' or 'eq27' (see docs/use-design.md). Writes
+    design.toml, target.csv, centreline.csv, design.png and run.json in `directory`, all of them once the design is
+    found. InputError before anything is written; ConvergenceError where the law has no answer.
+    """
+    started = time.perf_counter()
+    if objective not in OBJECTIVES:
+        raise InputError(f"objective = '{objective}' is not known: write {' or '.join(OBJECTIVES)}")
+    law = AnalyticModel() if law is None else law
+    target = read_target(target_path)
+    pieces, note = (target.pieces, GIVEN_NOTE) if target.pieces else (split(target.points), NOTE)
+    say(f"target {target.name}: {len(target.points)} points, {target.length:.2f} mm; {note}")
+    wanted = extract(target, pieces)
+    for i, piece in enumerate(wanted, start=1):
+        say(f"  piece {i}: {describe(piece)}")
+    solution = solve(target, wanted, law, objective, say)
+
+    line = predict(solution.manipulator, solution.pressure, law, 1.0, solution.base_pose)
+    errors = compare(line.points, target.points)
+    result = {
+        "split": note,
+        "objective": objective,
+        "law": law.name,
+        "active_bounds": list(solution.active),
+        "grown_ranges": list(solution.grown),
+        "target_error": errors.table(),
+        "piece": [
+            {**piece.table(), "predicted": predicted(segment, law.strains(segment, solution.pressure))}
+            for piece, segment in zip(wanted, solution.manipulator.segments)
+        ],
+    }
+    design = Design(
+        solution.manipulator, solution.pressure, name=target.name, base_pose=solution.base_pose, target="target.csv", result=result
+    )
+    directory = output_directory(directory)
+    write_csv(directory / "target.csv", POINT_COLUMNS, target.points)
+    write_csv(directory / "centreline.csv", ("s_mm", *POINT_COLUMNS), np.column_stack([line.s, line.points]))
+    write_design(directory / "design.toml", design)
+    seconds = time.perf_counter() - started
+    write_record(
+        directory,
+        inputs={"target": Path(target_path).name, "objective": objective, "law": law.name},
+        versions={"numpy": np.__version__, "scipy": scipy.__version__},
+        wall_seconds=round(seconds, 2),
+        evaluations=solution.evaluations,
+    )
+    for text in summary(design, solution, errors, seconds):
+        say(text)
+    _draw(directory, say)
+    return design
+
+
+def describe(piece):
+    """One line about an `Extracted` piece, in the field's units."""
+    table = piece.table()
+    names = [("tau_rad_per_mm", "tau", "rad/mm"), ("curvature_per_m", "curvature", "1/m"), ("torsion_rad_per_m", "torsion", "rad/m"),
+             ("cylinder_curvature_per_m", "cylinder curvature", "1/m"), ("pitch_mm", "pitch", "mm")]  # fmt: skip
+    rates = ", ".join(f"{name} {table[key]:.4g} {unit}" for key, name, unit in names if key in table)
+    note = f" ({piece.note})" if piece.note else ""
+    return f"{piece.kind:8s} {piece.length:6.1f} mm, {rates}{note}"
+
+
+def predicted(segment, strains):
+    """What the law predicts for a segment's active part, by file key; rates per deformed length beside the strains."""
+    table = {
+        "stretch": float(strains.stretch),
+        "k1_rad_per_mm": float(strains.k[0]),
+        "k2_per_mm": float(strains.k[1]),
+        "k3_per_mm": float(strains.k[2]),
+    }
+    if segment.kind == TWISTING_KIND:
+        table["tau_rad_per_mm"] = float(strains.twist_per_deformed_length)
+    else:
+        table["curvature_per_m"] = 1e3 * float(strains.frenet_curvature)
+        table["torsion_rad_per_m"] = 1e3 * float(strains.frenet_torsion)
+        table["cylinder_curvature_per_m"] = 1e3 * float(strains.helix_cylinder_curvature)
+        table["pitch_mm"] = float(strains.helix_pitch)
+    return table
+
+
+def summary(design, solution, errors, seconds):
+    """Lines of the table that a design run ends with."""
+    yield "  segment    angle  chambers  height    base     gap  length   wanted   reached (active part)"
+    for i, (segment, piece) in enumerate(zip(design.manipulator.segments, design.result["piece"]), start=1):
+        base = f"{segment.base_thickness:6.2f}" if segment.kind != TWISTING_KIND else "     -"
+        yield (
+            f"  {i} {segment.kind:9s}{segment.angle:6.1f}  {segment.chambers:8d}  {segment.chamber_height:6.2f}  {base}  "
+            f"{segment.gap:6.2f}  {segment.length:6.1f}   {_rates(piece)}   {_rates(piece['predicted'])}"
+        )
+    yield f"pressure {1e3 * design.pressure:.2f} kPa, undeformed length {design.manipulator.length:.1f} mm, {seconds:.0f} s"
+    yield "errors of the reduced prediction:"
+    for text in errors.lines():
+        yield "  " + text
+    if solution.grown:
+        yield "ranges that were widened: " + "; ".join(solution.grown)
+    yield "active bounds: " + ("; ".join(solution.active) or "none")
+
+
+def _rates(table):
+    if "tau_rad_per_mm" in table:
+        return f"tau {1e3 * table['tau_rad_per_mm']:.1f} rad/m"
+    return f"curvature {table['curvature_per_m']:.1f}, torsion {table.get('torsion_rad_per_m', 0.0):.1f} 1/m"
+
+
+def _draw(directory, say):
+    try:
+        from design.pictures import draw_design
+
+        draw_design(directory)
+    except ImportError:
+        say("no picture: matplotlib is missing, install it with: pip install 'pneunet[pictures]'")

@@ -1,0 +1,167 @@
+"""Pictures: the geometry behind them; that each is drawn for what it must hold."""
+
+import numpy as np
+import pytest
+
+from base.errors import ConvergenceError, InputError
+from base.files import read_columns
+from design.dimensions import spread
+from design.drawing import chamber_plan, section_groups, segment_table
+from design.labels import plain, segment_name, significant
+from geometry.designfile import Design
+from geometry.parameters import Manipulator, Segment
+from tests.design.fake_run import HELIX, PLANE, POSE, TWIST, make_run
+
+
+def test_spread_keeps_order_and_distance_and_moves_least():
+    free = [0.0, 2.0, 5.0]
+    assert spread(free, 1.0) == pytest.approx(free)
+    assert spread([1.0, 1.0], 1.0) == pytest.approx([0.5, 1.5])
+    crowded = spread([3.0, 0.1, 0.0, 0.2], 1.0)
+    assert np.diff(np.sort(crowded)).min() >= 1 - 1e-12
+    assert list(np.argsort(crowded)) == [2, 1, 3, 0]
+
+
+def test_numbers_and_names():
+    assert [plain(v) for v in (2.0, 5.7735, -0.001, 40.0)] == ["2", "5.77", "0", "40"]
+    assert [significant(v) for v in (0.0, 193812.3, 0.0123456, 625.13)] == ["0", "193800", "0.01235", "625.1"]
+    assert [segment_name(s) for s in (TWIST, PLANE, HELIX)] == [
+        "twisting 60° × 4",
+        "bending 90° × 4",
+        "helical 60° × 9",
+    ]
+
+
+def test_chamber_plan_is_thick_normal_to_the_chamber_and_turned_below():
+    corners = np.array(chamber_plan(TWIST, 10.0, 4.0, 6.0, 1))
+    along = (corners[3] - corners[0]) / np.linalg.norm(corners[3] - corners[0])
+    assert along == pytest.approx([np.cos(np.radians(60)), np.sin(np.radians(60))])
+    across = corners[1] - corners[0]
+    assert np.linalg.norm(across - (across @ along) * along) == pytest.approx(4.0)
+    below = np.array(chamber_plan(TWIST, 10.0, 4.0, 6.0, -1))
+    assert sorted(map(tuple, below.round(9))) == sorted(map(tuple, (corners * [1, -1]).round(9)))
+
+
+def test_equal_sections_are_drawn_once():
+    taller = Segment("one-sided", 75.0, 3, chamber_height=5.0, gap=1.5)
+    assert section_groups(Manipulator((TWIST, PLANE, HELIX, taller))) == [[0], [1, 2], [3]]
+    assert dict(segment_table(Manipulator((TWIST, PLANE))))["chambers"] == ["4 pairs", "4"]
+
+
+@pytest.mark.parametrize(
+    "segments",
+    [
+        (Segment("twisting", 60.0, 1, chamber_height=5.5),),
+        (
+            TWIST,
+            Segment("one-sided", 90.0, 2),
+            HELIX,
+            Segment("one-sided", 135.0, 20, chamber_height=5.0),
+            TWIST.mirrored,
+        ),
+    ],
+)
+def test_drawing_keeps_every_text_on_the_sheet_and_apart(segments):
+    pytest.importorskip("matplotlib")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from design.drawing import drawing_figure
+
+    figure = drawing_figure(Design(Manipulator(segments), 0.05, name="arm"))
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(renderer)
+    sheet = figure.bbox
+    texts = [t for ax in figure.axes for t in ax.texts if t.get_text()] + figure.texts
+    boxes = [t.get_window_extent(renderer) for t in texts]
+    for text, box in zip(texts, boxes):
+        assert sheet.x0 <= box.x0 and box.x1 <= sheet.x1 and sheet.y0 <= box.y0 and box.y1 <= sheet.y1, text.get_text()
+    for i, a in enumerate(boxes):
+        for j in range(i):
+            width = min(a.x1, boxes[j].x1) - max(a.x0, boxes[j].x0)
+            height = min(a.y1, boxes[j].y1) - max(a.y0, boxes[j].y0)
+            assert width < 2 or height < 2, (texts[i].get_text(), texts[j].get_text())
+
+
+def test_view_holds_all_points_and_is_orthonormal():
+    pytest.importorskip("matplotlib")
+    from design.bodies import PIXELS, view_of
+
+    points = np.random.default_rng(1).normal(size=(50, 3)) * [80, 20, 10]
+    view = view_of(points)
+    towards = np.cross(view.right, view.up)
+    assert np.column_stack([view.right, view.up, towards]).T @ np.column_stack(
+        [view.right, view.up, towards]
+    ) == pytest.approx(np.eye(3))
+    assert np.abs((points - view.focus) @ view.up).max() < view.half_height
+    assert np.abs((points - view.focus) @ view.right).max() < view.half_height * PIXELS[0] / PIXELS[1]
+
+
+def test_rendered_scale_is_the_views_scale():
+    pyvista = pytest.importorskip("pyvista")
+    from design.bodies import render, view_of
+
+    view = view_of(np.array([[-30.0, 0, 0], [30, 0, 0], [0, 20, 20]]))
+    image = render(
+        view, [(pyvista.Sphere(radius=10.0, center=view.focus), {"color": "black", "ambient": 1.0, "diffuse": 0.0})]
+    )
+    rows = np.flatnonzero((image < 128).all(axis=2).any(axis=1))
+    assert np.ptp(rows) * view.millimetres_per_pixel == pytest.approx(20.0, rel=0.02)
+
+
+def test_design_picture(tmp_path):
+    pytest.importorskip("matplotlib")
+    from design.pictures import draw_design
+
+    make_run(tmp_path, solve=False)
+    assert draw_design(tmp_path).stat().st_size > 20_000
+    (tmp_path / "target.csv").unlink()
+    draw_design(tmp_path)
+
+
+def test_shape_files(tmp_path):
+    pytest.importorskip("pyvista")
+    from design.shape import run_shape
+
+    make_run(tmp_path, solve=False)
+    folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, say=lambda text: None)
+    rows = read_columns(folder / "centrelines.csv", ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"])
+    at_design = rows[rows[:, 0] == 20.0][:, 1:]
+    assert at_design == pytest.approx(read_columns(tmp_path / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"]))
+    assert rows[rows[:, 0] == 10.0][0, 2:] == pytest.approx(POSE[:3, 3])
+    assert {p.name for p in folder.iterdir()} == {
+        "centrelines.csv", "body_10kPa.vtp", "body_20kPa.vtp", "bodies.png", "inflation.gif", "run.json",
+    }  # fmt: skip
+    assert (folder / "inflation.gif").stat().st_size < 3e6
+
+
+class Limited:
+    """A law that has no solution above 15 kPa."""
+
+    name = "limited"
+
+    def strains(self, segment, pressure):
+        from reduced.model import AnalyticModel
+
+        if np.max(pressure) > 0.015:
+            raise ConvergenceError("limit at 15 kPa")
+        return AnalyticModel().strains(segment, pressure)
+
+
+def test_shape_beyond_the_limit_keeps_and_names_the_rest(tmp_path):
+    pytest.importorskip("pyvista")
+    from design.shape import run_shape
+
+    make_run(tmp_path, (PLANE,), pressure=0.01, solve=False)
+    with pytest.raises(ConvergenceError, match=r"no shape at 20 kPa.*kept in .*: 10 kPa"):
+        run_shape(tmp_path / "design.toml", [0.01, 0.02], tmp_path, say=lambda text: None, model=Limited())
+    assert (tmp_path / "shape" / "body_10kPa.vtp").exists()
+
+
+def test_shape_refuses_bad_pressures(tmp_path):
+    from design.shape import run_shape
+
+    make_run(tmp_path, (PLANE,), solve=False)
+    for pressures in ([], [-0.01], [float("nan")], [50.0]):
+        with pytest.raises(InputError, match="--pressure-kPa"):
+            run_shape(tmp_path / "design.toml", pressures, tmp_path)
+    assert not (tmp_path / "shape").exists()

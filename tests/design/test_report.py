@@ -1,0 +1,98 @@
+"""The report: what it says about runs whose numbers are known, whole and with parts missing."""
+
+import re
+
+import numpy as np
+import pytest
+
+from base.errors import InputError
+from base.files import read_columns
+from base.se3 import transform
+from design.comparison import Comparison, overlap, smooth, stopped_short, verdict
+from design.metrics import compare
+from design.rundata import read_run
+from reduced.model import AnalyticModel
+from tests.design.fake_run import FACTOR, HELIX, PLANE, POSE, make_run
+
+
+def judged(directory):
+    run = read_run(directory)
+    return run, Comparison.of(run, AnalyticModel())
+
+
+def test_comparison_is_made_in_target_coordinates(tmp_path):
+    make_run(tmp_path, fields=False)
+    run, c = judged(tmp_path)
+    assert c.solved[0] == pytest.approx(POSE[:3, 3])
+    stations = read_columns(tmp_path / "solve" / "centrelines.csv", ["x_mm", "y_mm", "z_mm"])
+    assert c.solved[-1] == pytest.approx(transform(POSE, stations)[-1])
+    assert c.reduced_target == compare(c.reduced, run.target)
+    assert np.allclose(run.solve.strains.k, FACTOR * c.strains.k)
+    assert not stopped_short(run) and c.notes == ()
+
+
+def test_smooth_follows_an_arc_between_stations():
+    angle = np.linspace(0, 2, 12)
+    arc = smooth(30 * angle, 30 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]))
+    assert np.linalg.norm(arc, axis=1) == pytest.approx(30.0, abs=0.02)
+
+
+def test_solution_that_stopped_short_is_compared_at_its_own_pressure(tmp_path):
+    make_run(tmp_path, reached=0.6, fields=False)
+    run, c = judged(tmp_path)
+    assert stopped_short(run)
+    assert np.allclose(run.solve.strains.k, FACTOR * c.strains.k)
+    assert "stops at 12 kPa" in c.notes[0] and "stopped short" in verdict(run, c)
+
+
+def test_verdict_tells_agreement_contradiction_and_overlap(tmp_path):
+    make_run(tmp_path / "a", (PLANE,), pressure=0.001, fields=False)
+    assert "confirms the reduced prediction" in verdict(*judged(tmp_path / "a"))
+    make_run(tmp_path / "b", (HELIX, HELIX), pressure=0.04, fields=False, overlap=0.2)
+    run, c = judged(tmp_path / "b")
+    assert "contradicts the reduced prediction" in verdict(run, c)
+    assert overlap(run) == pytest.approx(0.2) and "Walls overlap by up to 0.20 mm" in verdict(run, c)
+    make_run(tmp_path / "c", (PLANE,), solve=False)
+    assert "no finite element solution confirms it yet" in verdict(*judged(tmp_path / "c"))
+
+
+def test_an_edited_design_is_noticed(tmp_path):
+    make_run(tmp_path, solve=False)
+    text = (tmp_path / "design.toml").read_text()
+    (tmp_path / "design.toml").write_text(text.replace("pressure_kPa = 20.0", "pressure_kPa = 30.0"))
+    assert "centreline.csv differs" in judged(tmp_path)[1].notes[0]
+
+
+def test_rest_state_alone_is_no_solution(tmp_path):
+    make_run(tmp_path, fields=False)
+    steps = tmp_path / "solve" / "steps.csv"
+    steps.write_text("\n".join(steps.read_text().splitlines()[:2]) + "\n")
+    assert read_run(tmp_path).solve is None
+
+
+def test_report_page_is_whole_and_self_contained(tmp_path):
+    pytest.importorskip("pyvista")
+    from design.report import write_report
+
+    make_run(tmp_path, overlap=0.13)
+    page = write_report(tmp_path, say=lambda text: None).read_text()
+    names = {p.name for p in (tmp_path / "report").iterdir()}
+    assert names == {
+        "curves.png", "drawing.png", "fe.png", "fe_displacement.png", "fe_stretch.png", "history.png", "reduced.png",
+        "reference.png", "target.png", "walls.png",
+    }  # fmt: skip
+    assert page.count("data:image/png;base64,") == len(names)
+    assert not re.search(r"(src|href)=\"(?!data:)", page) and str(tmp_path) not in page
+    assert "WALLS OVERLAP in 1 of" in page and "mpirun -n 2 pneunet solve" in page
+    assert f"{FACTOR:.3f}" in page  # FE / reduced of a curvature
+
+
+def test_report_of_a_design_alone_says_what_is_missing(tmp_path):
+    pytest.importorskip("pyvista")
+    from design.report import write_report
+
+    make_run(tmp_path, solve=False)
+    page = write_report(tmp_path, say=lambda text: None).read_text()
+    assert "There is no finite element solution in this folder yet" in page
+    with pytest.raises(InputError, match="design.toml"):
+        write_report(tmp_path / "report")

@@ -1,0 +1,90 @@
+"""From segments to centrelines: passive pieces, signs, mirrors, shapes of arrays, bad input."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from base.errors import InputError
+from base.materials import NeoHookean
+from base.strains import RodStrains
+from geometry import Manipulator, Segment
+from reduced import AnalyticModel, predict
+from reduced.model import manipulator_strains
+
+TWISTING = Segment("twisting", 60.0, 4, cavity_floor=0.5)
+BENDING = Segment("one-sided", 90.0, 3)
+HELICAL = Segment("one-sided", 60.0, 6)
+ARM = Manipulator((TWISTING, BENDING, HELICAL))
+
+
+def test_shapes_follow_the_pressures_and_calls_agree():
+    model = AnalyticModel()
+    grid = np.array([[0.0, 0.02], [0.03, 0.01]])
+    for segment in (TWISTING, HELICAL):
+        strains = model.strains(segment, grid)
+        assert strains.k.shape == (2, 2, 3)
+        single = model.strains(replace(segment, chambers=9), 0.03)
+        np.testing.assert_allclose(single.k, strains.k[1, 0], atol=1e-9)
+        np.testing.assert_allclose(single.e, strains.e[1, 0], atol=1e-9)
+        np.testing.assert_allclose(strains.k[0, 0], 0.0, atol=1e-12)
+
+
+def test_twisting_segments_twist_like_their_layers_and_do_not_bend():
+    """Chambers on top at angle < 90 shear the upper layer by eps_xy < 0, and twist gives eps_xy = -k1 z/2: k1 > 0."""
+    strains = AnalyticModel().strains(TWISTING, 0.02)
+    assert strains.k[0] > 0
+    np.testing.assert_array_equal(strains.k[1:], 0.0)
+    np.testing.assert_allclose(AnalyticModel().strains(TWISTING.mirrored, 0.02).k, -strains.k, rtol=1e-9)
+
+
+def test_passive_pieces_are_unstrained_and_frames_continuous():
+    line = predict(ARM, 0.03)
+    assert line.s[-1] == pytest.approx(ARM.length)
+    ends = np.concatenate([ARM.starts, ARM.starts + [s.length for s in ARM.segments]])
+    assert all(np.isclose(line.s, end).any() for end in ends)
+    strains = manipulator_strains(ARM, 0.03, AnalyticModel())
+    passive = [i for i, (owner, _) in enumerate(ARM.pieces) if owner is None]
+    np.testing.assert_array_equal(strains.k[passive], 0.0)
+    np.testing.assert_array_equal(strains.e[passive], np.tile([1.0, 0, 0], (len(passive), 1)))
+
+
+def test_no_pressure_no_shape_change():
+    line = predict(ARM, 0.0)
+    np.testing.assert_allclose(line.points, np.stack([line.s, 0 * line.s, 0 * line.s], axis=1), atol=1e-9)
+
+
+def test_mirrored_manipulators_have_mirrored_centrelines():
+    np.testing.assert_allclose(predict(ARM.mirrored, 0.03).points, predict(ARM, 0.03).points * [1, -1, 1], atol=1e-8)
+
+
+def test_any_law_with_strains_can_predict():
+    class Law:
+        name = "constant"
+
+        def strains(self, segment, pressure):
+            return RodStrains([1 + pressure, 0, 0], [0, 0, 0])
+
+    line = predict(ARM, 0.5, Law())
+    active = sum(s.active_length for s in ARM.segments)
+    assert line.length == pytest.approx(ARM.length + 0.5 * active)
+
+
+@pytest.mark.parametrize("pressure", [-0.01, np.nan])
+def test_bad_pressure(pressure):
+    with pytest.raises(InputError, match="pressure_kPa"):
+        AnalyticModel().strains(HELICAL, pressure)
+
+
+def test_distance_from_finite_elements():
+    """Cell results of the cases one-sided-w10 and twist-w12 (docs/theory-reduced.md): not fitted, so only near."""
+    model = AnalyticModel()
+    size = {"width": 10.0, "channel_width": 2.0, "material": NeoHookean(mu=0.2068)}
+    helical = model.strains(Segment("one-sided", 60.0, 5, **size), 0.05)
+    bending = model.strains(Segment("one-sided", 90.0, 5, **size), 0.05)
+    assert 0.5 < helical.k[1] / 0.0367 < 1.0 and 0.5 < bending.k[1] / 0.040 < 1.0
+    assert helical.k[0] / helical.k[1] == pytest.approx(0.70, abs=0.05)
+    w12 = Segment("twisting", 60.0, 5, chamber_height=5.5, gap=2.0, cavity_floor=0.5, material=NeoHookean(mu=0.317))
+    twist = model.strains(w12, np.array([10, 20, 30, 40, 50]) * 1e-3).twist_per_deformed_length
+    ratio = twist / np.array([10.3, 18.3, 24.8, 30.4, 35.3]) * 1e3
+    assert (0.5 < ratio).all() and (ratio < 1.3).all()
