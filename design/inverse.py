@@ -25,6 +25,7 @@ PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)
 PAIRS = 101
 STEP = 1e-5  # of a variable's range, for differences
+CONFIRMED = 1.05  # cost over that of the next start from there, which leaves the bounds, at which an optimum is one
 INSET = 0.05  # of a variable's range: starts keep off the bounds, where the interior method crawls
 AT_BOUND = 1e-3  # of a variable's range
 PREFERENCE = 0.02  # mm of misfit per range that a dimension leaves its start by: decides where the target does not
@@ -47,7 +48,7 @@ RANGES = {
     },
     TWISTING_KIND: {
         "angle": ((45, 135), (30, 150)),
-        "chamber_height": ((4, 6), (2, 8)),
+        "chamber_height": ((4, 6), (2, 6)),  # higher ones lean on each other as the segment twists
         "gap": ((2, 3), (2, 4)),
     },
 }
@@ -213,7 +214,10 @@ def solve(target, pieces, law, objective=PAIRED, say=print):
 def prototype(target, piece):
     """The Segment with a piece's start dimensions: material and shared dimensions are the same for all pieces."""
     kind = TWISTING_KIND if piece.kind == TWISTING else ONE_SIDED
-    return Segment(kind, 90.0, 1, **(START[kind] | target.start), material=target.material)
+    try:
+        return Segment(kind, 90.0, 1, **(START[kind] | target.start), material=target.material)
+    except InputError as error:
+        raise InputError(f"[segment] (start dimensions of the {kind} segments): {error}") from None
 
 
 def _limits(target, piece, segment):
@@ -223,6 +227,12 @@ def _limits(target, piece, segment):
         ranges = {"angle": ranges["angle"]} | {name: (bounds, bounds) for name, bounds in target.vary.items()}
         if segment.kind == TWISTING_KIND:
             ranges.pop("base_thickness", None)
+        for name, bounds in target.vary.items():
+            for value in bounds:
+                try:
+                    replace(segment, **{name: value})
+                except InputError as error:
+                    raise InputError(f"[vary]: {error}") from None
     if piece.kind == BENDING:
         ranges = {name: limits for name, limits in ranges.items() if name != "angle"}
     return ranges
@@ -233,7 +243,9 @@ def _guesses(target, pieces, prototypes, law):
     for i, (piece, segment) in enumerate(zip(pieces, prototypes)):
         shortest = 2 * segment.end_length + segment.chamber_thickness
         if piece.length < shortest:
-            raise InputError(f"piece {i + 1}: {piece.length:.3g} mm is too short for one chamber and its ends ({shortest:.3g} mm)")
+            raise InputError(
+                f"[[piece]] {i + 1}: length_mm = {piece.length:.3g} is too short for one chamber and its ends ({shortest:.3g} mm)"
+            )
         limits = _limits(target, piece, segment)
         angles.append(_grid(limits.get("angle"), 90.0, 5.0))
         heights.append(_grid(limits.get("chamber_height"), segment.chamber_height, 1.0))
@@ -320,12 +332,12 @@ class _Run:
         return np.array([v.value for v in variables] + [0.0] * self.problem.turns.shape[1])
 
     def optimised(self, real_counts):
-        """The local optimum; ranges grow while it sits on a bound that may."""
+        """The local optimum; ranges grow while it sits on a bound that may, and a new start has to confirm it."""
         run = self
         while True:
-            run = run._optimised_once(real_counts)
+            before, run = run.cost, run._optimised_once(real_counts)
             variables = tuple(v.grown for v in run.variables)
-            if variables == run.variables:
+            if variables == run.variables and before < CONFIRMED * run.cost:
                 return run
             names = [v.title for v, w in zip(run.variables, variables) if v != w]
             run = replace(run, variables=variables, grown=tuple(dict.fromkeys(run.grown + tuple(names))))

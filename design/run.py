@@ -13,12 +13,12 @@ from design.extraction import extract
 from design.inverse import OBJECTIVES, PAIRED, solve
 from design.metrics import compare
 from design.segmentation import NOTE, split
-from design.targets import POINT_COLUMNS, read_target
+from design.targets import HELICAL, POINT_COLUMNS, TWISTING, read_target
 from geometry.designfile import Design, write_design
 from geometry.parameters import TWISTING as TWISTING_KIND
 from reduced.model import AnalyticModel, predict
 
-GIVEN_NOTE = "split as given"
+GIVEN_NOTE = "split given by the user"
 
 
 def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
@@ -50,7 +50,7 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
         "grown_ranges": list(solution.grown),
         "target_error": errors.table(),
         "piece": [
-            {**piece.table(), "predicted": predicted(segment, law.strains(segment, solution.pressure))}
+            {**piece.table(), "predicted": predicted(piece.kind, law.strains(segment, solution.pressure))}
             for piece, segment in zip(wanted, solution.manipulator.segments)
         ],
     }
@@ -85,18 +85,19 @@ def describe(piece):
     return f"{piece.kind:8s} {piece.length:6.1f} mm, {rates}{note}"
 
 
-def predicted(segment, strains):
-    """What the law predicts for a segment's active part, by file key; rates per deformed length beside the strains."""
+def predicted(kind, strains):
+    """What the law predicts for the active part of a piece's segment, by file key; rates per deformed length beside the strains."""
     table = {
         "stretch": float(strains.stretch),
         "k1_rad_per_mm": float(strains.k[0]),
         "k2_per_mm": float(strains.k[1]),
         "k3_per_mm": float(strains.k[2]),
     }
-    if segment.kind == TWISTING_KIND:
+    if kind == TWISTING:
         table["tau_rad_per_mm"] = float(strains.twist_per_deformed_length)
     else:
         table["curvature_per_m"] = 1e3 * float(strains.frenet_curvature)
+    if kind == HELICAL:
         table["torsion_rad_per_m"] = 1e3 * float(strains.frenet_torsion)
         table["cylinder_curvature_per_m"] = 1e3 * float(strains.helix_cylinder_curvature)
         table["pitch_mm"] = float(strains.helix_pitch)

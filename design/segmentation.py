@@ -23,7 +23,7 @@ NOTE = "simple automatic split (no twist is sought where the curve is not straig
 def split(points):
     """The pieces (tuple of Piece, rates left open) of a curve (n, 3)."""
     length = arc_lengths(points)[-1]
-    shortest = min(SHORTEST, length / 2)
+    shortest = min(SHORTEST, length)
     joints = np.linspace(0, length, min(GRID, max(2, int(length / shortest * 4))) + 1)
     best = [(0.0, None, None)] + [(np.inf, None, None)] * (len(joints) - 1)
     for j in range(1, len(joints)):

@@ -91,12 +91,13 @@ def cavity_solids(segment, start, channel_from, channel_to):
 
 
 def channel_range(manipulator):
-    """x (mm) at which the channel begins and ends: the centres of the first and the last chamber, so that the ends
-    are closed by the passive caps. A single chamber keeps a stub of its own thickness."""
-    first = manipulator.segments[0].chamber_positions[0]
-    last = manipulator.starts[-1] + manipulator.segments[-1].chamber_positions[-1]
-    stub = 0.25 * manipulator.segments[0].cavity_thickness if last - first < _TOLERANCE else 0.0
-    return first - stub, last + stub
+    """x (mm) at which the channel begins and ends: half a pitch beyond the first and the last chamber, so that every
+    chamber has its whole cell; what remains of the passive ends closes it."""
+    first, last = manipulator.segments[0], manipulator.segments[-1]
+    return (
+        first.chamber_positions[0] - first.pitch / 2,
+        manipulator.starts[-1] + last.chamber_positions[-1] + last.pitch / 2,
+    )
 
 
 def build(manipulator):

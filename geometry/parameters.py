@@ -71,6 +71,11 @@ class Segment:
                 f"chamber_height_mm = {self.chamber_height:g}: the chamber (top at z = {self.chamber_top:g} mm) does not rise above "
                 f"the core (z = {self.core_top:g} mm)"
             )
+        if self.end_wall < 0.5:
+            raise InputError(
+                f"end_margin_mm = {self.end_margin:g} leaves {self.end_wall:.2g} mm to close the channel's end: "
+                f"at least {self.end_margin + 0.5 - self.end_wall:.3g} mm is needed with gap_mm = {self.gap:g}"
+            )
         if self.length > 2000:
             raise InputError(f"chambers = {self.chambers}: the segment would be {self.length:.0f} mm long (at most 2000)")
 
@@ -137,6 +142,11 @@ class Segment:
     def end_length(self):
         """Passive length at each end, mm: wedge of the slanted chamber and the bare core beyond it."""
         return self.width / 2 * abs(self.cot) + self.end_margin
+
+    @property
+    def end_wall(self):
+        """What closes the channel at a free end, mm: the channel runs half a gap beyond the outermost chamber."""
+        return self.end_length - self.gap / self.sin / 2
 
     @property
     def active_length(self):

@@ -46,9 +46,12 @@ class Measured:
 class ManipulatorSolve:
     """The boundary value problem of a meshed manipulator with everything that is measured on it."""
 
-    def __init__(self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None):
+    def __init__(self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False):
+        """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh."""
         self.manipulator, self.comm = manipulator, comm
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
+        if flip_y:
+            mesh.geometry.x[:, 1] *= -1
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
         self.problem = MixedProblem(
             mesh, cell_tags, facet_tags, materials, (cad.CAVITY, cad.CHANNEL), [Support(cad.BASE)]

@@ -65,7 +65,7 @@ class MixedProblem:
         J = ufl.det(F)
         dx = ufl.Measure("dx", domain=mesh, subdomain_data=cell_tags, metadata={"quadrature_degree": VOLUME_DEGREE})
         ds = ufl.Measure("ds", domain=mesh, subdomain_data=facet_tags, metadata={"quadrature_degree": PRESSURE_DEGREE})
-        cavity = ds(tuple(pressure_tags))
+        cavity = ds(tuple(pressure_tags) or (0,))  # gmsh numbers its tags from 1
         N = ufl.FacetNormal(mesh)
         stored = self._stored_energy(F, cell_tags, materials, dx)
         internal = ufl.derivative(stored + p * (J - 1) * dx, self.state, v)

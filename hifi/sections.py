@@ -21,7 +21,6 @@ class SectionFrames:
         self.problem, self.manipulator = problem, manipulator
         self.comm = problem.mesh.comm
         wall = surface.facet_nodes(problem, cad.CHANNEL)
-        channel = cad.channel_range(manipulator)
         windows, self.segment_stations = [], []
         for segment, start in zip(manipulator.segments, manipulator.starts):
             s = np.arange(2 * segment.chambers - 1) * segment.pitch / 2 + start + segment.chamber_positions[0]
@@ -30,8 +29,7 @@ class SectionFrames:
             joint = start + segment.length
             if joint < manipulator.length - 1e-9:
                 windows.append((joint, segment.pitch))
-        # a channel shorter than a pitch (a single chamber) has no section frame: its ends are measured instead
-        windows = sorted(windows) if channel[1] - channel[0] > min(pitch for _, pitch in windows) else []
+        windows = sorted(windows)
         self._integrals = [surface.SlabIntegral(problem, wall, s - pitch / 2, s + pitch / 2) for s, pitch in windows]
         self._integrals.append(surface.SlabIntegral(problem, surface.facet_nodes(problem, cad.TIP)))
         self.stations = np.array([0.0] + [s for s, _ in windows] + [manipulator.length])
@@ -46,12 +44,12 @@ class SectionFrames:
     def segment_strains(self, frames):
         """RodStrains of shape (segments, 3): mean of the per-pitch strains between the chambers of each segment.
 
-        A segment of one chamber, or one without channel wall, is measured between its ends.
+        A segment of one chamber is measured between its ends.
         """
         e, k = [], []
         for stations, start, segment in zip(self.segment_stations, self.manipulator.starts, self.manipulator.segments):
             index = [int(np.argmin(abs(self.stations - s))) for s in stations]
-            if len(index) < 2 or max(abs(self.stations[index] - stations)) > 1e-9:
+            if len(index) < 2:
                 index = [int(np.argmin(abs(self.stations - s))) for s in (start, start + segment.length)]
             relative = se3.inverse_pose(frames[index[:-1]]) @ frames[index[1:]]
             strains = RodStrains.from_relative_pose(relative, np.diff(self.stations[index]))

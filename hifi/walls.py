@@ -76,7 +76,7 @@ def wall_distance(points, wall):
     normal = np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     # behind the wall only when the wall's interior is what is closest; past its rim the sign has no meaning
-    behind = np.einsum("ni,ni->n", offset, normal) < -0.5 * distance
+    behind = np.einsum("ni,ni->n", offset, normal) < -0.9 * distance
     return float(np.where(behind, -distance, distance).min())
 
 

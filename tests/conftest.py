@@ -1,0 +1,30 @@
+"""Serial and MPI runs alike: release PETSc objects and keep ranks together between tests."""
+
+import gc
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+@pytest.fixture(autouse=True)
+def release_between_tests(request):
+    yield
+    if "hifi" in str(request.path):
+        from mpi4py import MPI
+
+        gc.collect()
+        MPI.COMM_WORLD.barrier()
+
+
+@pytest.fixture
+def shared_directory(tmp_path_factory):
+    """A temporary folder that all ranks agree on."""
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    return Path(comm.bcast(str(tmp_path_factory.mktemp("shared")) if comm.rank == 0 else None, root=0))

@@ -1,0 +1,58 @@
+import json
+
+import numpy as np
+import pytest
+from tests.design.toy_law import ToyLaw
+
+from base.errors import InputError
+from base.files import read_columns
+from design.metrics import compare
+from design.run import run_design
+from geometry.designfile import read_design
+from geometry.parameters import Manipulator, Segment
+from reduced.model import predict
+
+POINTS = ("x_mm", "y_mm", "z_mm")
+
+
+@pytest.fixture
+def helix(tmp_path):
+    segment = Segment("one-sided", 65.0, 12, end_margin=1.0)
+    points = predict(Manipulator((segment,)), 0.04, ToyLaw()).points + [10.0, 20.0, 30.0]
+    np.savetxt(tmp_path / "helix.csv", points, fmt="%.4f", delimiter=",")
+    return tmp_path / "helix.csv"
+
+
+def test_a_bare_csv_becomes_a_folder_that_reads_back(helix, tmp_path):
+    said = []
+    design = run_design(helix, tmp_path / "out", ToyLaw(), say=said.append)
+    out = tmp_path / "out"
+    assert any("simple automatic split" in line for line in said)
+    again = read_design(out / "design.toml")
+    assert again.manipulator == design.manipulator and again.pressure == design.pressure and again.target == "target.csv"
+    target = read_columns(out / again.target, POINTS)
+    line = read_columns(out / "centreline.csv", ("s_mm", *POINTS))
+    assert np.allclose(target[0], line[0, 1:]) and line[-1, 0] == pytest.approx(design.manipulator.length)
+    repeated = predict(again.manipulator, again.pressure, ToyLaw(), 1.0, again.base_pose).points
+    assert np.allclose(repeated, line[:, 1:], atol=1e-6)
+    errors = compare(line[:, 1:], target)
+    assert errors.rms < 0.1
+    written = again.result["target_error"]
+    assert written["rms_mm"] == pytest.approx(errors.rms, rel=1e-6) and written["eq27_sum_mm2"] == pytest.approx(errors.eq27, rel=1e-6)
+    assert {"hausdorff_mm", "tip_mm", "length_mismatch_mm"} <= set(written)
+    assert "simple automatic split" in again.result["split"] and again.result["piece"][0]["kind"] == "helical"
+    assert json.loads((out / "run.json").read_text())["inputs"]["law"] == "toy"
+
+
+def test_the_same_input_gives_the_same_design(helix, tmp_path):
+    for name in ("a", "b"):
+        run_design(helix, tmp_path / name, ToyLaw(), say=lambda text: None)
+    assert (tmp_path / "a/design.toml").read_text() == (tmp_path / "b/design.toml").read_text()
+
+
+def test_bad_input_leaves_nothing_behind(helix, tmp_path):
+    helix.write_text(helix.read_text() + "oops,0,0\n")
+    for target, objective in ((helix, "paired"), (tmp_path / "none.csv", "paired"), (helix, "best")):
+        with pytest.raises(InputError):
+            run_design(target, tmp_path / "out", ToyLaw(), objective, say=lambda text: None)
+        assert not (tmp_path / "out").exists()

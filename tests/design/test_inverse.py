@@ -1,0 +1,142 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.design.toy_law import ToyLaw
+
+from base import se3
+from base.errors import ConvergenceError, InputError
+from design.extraction import extract
+from design.inverse import EQ27, Variable, solve
+from design.lookup import active_length, count_for
+from design.metrics import compare
+from design.targets import Piece, Target
+from geometry.parameters import Manipulator, Segment
+from reduced.model import predict
+
+START = {"end_margin": 1.0}
+TWISTING = Segment("twisting", 65.0, 7, gap=2.2, cavity_floor=0.5, chamber_height=5.5, **START)
+BENDING = Segment("one-sided", 90.0, 5, **START)
+HELICAL = Segment("one-sided", 60.0, 9, chamber_height=4.4, **START)
+BASE = {"base_direction": np.array([1.0, 0, 0]), "base_width": np.array([0, 1.0, 0])}
+MIRROR = np.array([1.0, -1.0, 1.0])
+
+
+def made(segments, pressure=0.04, pose=None):
+    """(centreline, pieces) of a known manipulator; the pieces have the right kinds and deformed lengths only."""
+    line = predict(Manipulator(segments), pressure, ToyLaw(), 0.5, pose)
+    ends = np.interp(np.append(Manipulator(segments).starts, line.s[-1]), line.s, line.arc_length)
+    kinds = ["twisting" if s.kind == "twisting" else "bending" if s.angle == 90 else "helical" for s in segments]
+    return line, tuple(Piece(kind, length) for kind, length in zip(kinds, np.diff(ends)))
+
+
+def designed(target, objective="paired", law=None):
+    law = law or ToyLaw()
+    solution = solve(target, extract(target, target.pieces), law, objective, say=lambda text: None)
+    line = predict(solution.manipulator, solution.pressure, law, 0.5, solution.base_pose)
+    return solution, compare(line.points, target.points), line
+
+
+def test_real_numbers_of_chambers_agree_with_segment_at_whole_ones():
+    assert active_length(HELICAL, 9) == pytest.approx(HELICAL.active_length)
+    assert count_for(HELICAL, 1.0, HELICAL.length) == pytest.approx(9)
+
+
+def test_a_known_design_is_recovered_from_its_centreline():
+    line, pieces = made((TWISTING, BENDING, HELICAL))
+    solution, errors, _ = designed(Target(line.points, pieces=pieces, **BASE))
+    assert errors.rms < 0.1 and errors.hausdorff < 0.3
+    assert errors.eq27 <= errors.eq27_points * 0.1**2
+    assert [s.chambers for s in solution.manipulator.segments] == pytest.approx([7, 5, 9], abs=1)
+    assert [s.angle for s in solution.manipulator.segments] == pytest.approx([65, 90, 60], abs=3)
+    assert np.allclose(solution.base_pose, np.eye(4))
+
+
+def test_the_base_turns_to_a_target_anywhere_in_space():
+    pose = se3.exp_pose(np.array([1.0, -0.5, 2.0, 30.0, 40.0, -20.0]))
+    line, pieces = made((BENDING, HELICAL), pose=pose)
+    solution, errors, _ = designed(Target(line.points, pieces=pieces))
+    assert errors.rms < 0.1
+    assert np.allclose(solution.base_pose[:3, 3], pose[:3, 3]) and np.allclose(solution.base_pose, pose, atol=0.05)
+
+
+def test_a_fixed_direction_leaves_the_roll_free():
+    pose = se3.exp_pose(np.array([1.0, 0, 0, 0, 0, 0]))
+    line, pieces = made((BENDING, HELICAL), pose=pose)
+    solution, errors, _ = designed(Target(line.points, pieces=pieces, base_direction=BASE["base_direction"]))
+    assert errors.rms < 0.1 and np.allclose(solution.base_pose[:3, 0], [1, 0, 0]) and np.allclose(solution.base_pose, pose, atol=0.05)
+
+
+def test_mirrored_target_gives_the_mirrored_design():
+    line, pieces = made((TWISTING, HELICAL))
+    one, _, _ = designed(Target(line.points, pieces=pieces, **BASE))
+    other, errors, _ = designed(Target(line.points * MIRROR, pieces=pieces, **BASE))
+    assert errors.rms < 0.1 and one.pressure == pytest.approx(other.pressure, rel=0.02)
+    for a, b in zip(one.manipulator.segments, other.manipulator.mirrored.segments):
+        assert a.chambers == b.chambers and a.angle == pytest.approx(b.angle, abs=0.5)
+
+
+def test_twist_that_no_point_shows_is_still_built_as_given():
+    line, pieces = made((HELICAL, TWISTING))
+    pieces = (pieces[0], replace(pieces[1], twist=0.02))
+    solution, _, _ = designed(Target(line.points, pieces=pieces))
+    segment = solution.manipulator.segments[1]
+    turned = ToyLaw().strains(segment, solution.pressure).k[0] * segment.active_length
+    assert turned == pytest.approx(0.02 * pieces[1].length, abs=0.05)
+
+
+def test_frames_are_followed():
+    line, pieces = made((HELICAL, TWISTING))
+    target = Target(line.points, frames=line.poses[:, :3, :3], pieces=pieces)
+    solution, errors, found = designed(target)
+    assert errors.rms < 0.2
+    assert np.allclose(found.poses[-1, :3, :3], line.poses[-1, :3, :3], atol=0.05)
+
+
+def test_a_range_grows_when_the_optimum_sits_on_its_bound():
+    at_bound = Variable("chamber_height", 0, 5.0, 3.0, 5.0, 2.0, 8.0)
+    assert at_bound.grown.high == 6.0 and at_bound.grown.low == 3.0
+    assert replace(at_bound, value=4.0).grown == replace(at_bound, value=4.0)
+    assert replace(at_bound, high=8.0, value=8.0).grown.high == 8.0
+    line, pieces = made((replace(BENDING, chamber_height=6.5, chambers=8),), pressure=0.05)
+    solution, errors, _ = designed(Target(line.points, pieces=pieces, pressure_range=(0.03, 0.03)))
+    assert errors.rms < 0.1 and solution.manipulator.segments[0].chamber_height > 5
+    assert "segment 1 chamber_height" in solution.grown
+
+
+def test_bounds_that_may_not_grow_are_named():
+    line, pieces = made((replace(BENDING, chambers=8),), pressure=0.05)
+    target = Target(line.points, pieces=pieces, pressure_range=(0.01, 0.02), vary={"chamber_height": (3.0, 4.0)})
+    solution, errors, _ = designed(target)
+    assert solution.pressure == pytest.approx(0.02, rel=1e-2) and errors.rms > 0.5
+    assert "pressure = 20 kPa (upper bound)" in solution.active
+    assert "segment 1 chamber_height = 4 mm (upper bound)" in solution.active and solution.grown == ()
+
+
+def test_eq27_objective_is_the_papers_sum():
+    line, pieces = made((BENDING, HELICAL))
+    points = line.points + np.column_stack([0 * line.s, 0 * line.s, 0.5 * np.sin(line.s / 15)])
+    target = Target(points, pieces=pieces)
+    _, paired, _ = designed(target)
+    _, nearest, _ = designed(target, EQ27)
+    assert nearest.eq27 <= 1.001 * paired.eq27
+
+
+def test_a_law_that_ends_at_a_limit_load_is_kept_within():
+    line, pieces = made((BENDING, HELICAL), pressure=0.03)
+    solution, errors, _ = designed(Target(line.points, pieces=pieces), law=ToyLaw(limit=0.032))
+    assert solution.pressure <= 0.032 and errors.rms < 0.2
+    with pytest.raises(ConvergenceError, match="no equilibrium for these dimensions"):
+        designed(Target(line.points, pieces=pieces), law=ToyLaw(limit=0.001))
+
+
+def test_what_cannot_be_built_is_said():
+    line, pieces = made((BENDING, HELICAL))
+    with pytest.raises(InputError, match=r"\[\[piece\]\] 1: length_mm = 4 is too short"):
+        designed(Target(line.points, pieces=(Piece("bending", 4.0), Piece("helical", sum(p.length for p in pieces) - 4))))
+    with pytest.raises(InputError, match=r"\[segment\].*side_wall_mm"):
+        designed(Target(line.points, pieces=pieces, start={"side_wall": 6.0}))
+    with pytest.raises(InputError, match=r"\[vary\].*angle_deg = 10"):
+        designed(Target(line.points, pieces=pieces, vary={"angle": (10.0, 20.0)}))
+    with pytest.raises(InputError, match="objective = 'best' is not known"):
+        designed(Target(line.points, pieces=pieces), objective="best")

@@ -1,0 +1,105 @@
+"""Finite elements against exact solutions of incompressible neo-Hookean bodies (mu = 1 MPa, radii 1 and 2 mm)."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.optimize import brentq
+
+from base.materials import NeoHookean
+from hifi.path import LoadPath
+from hifi.problem import MixedProblem, Support
+from hifi.rod_coordinates import RodCoordinates
+from hifi.solver import Newton
+from hifi.stepping import StepSize, run_steps
+from tests.hifi import bodies
+
+SYMMETRY = [Support(bodies.PLANE_X, 0), Support(bodies.PLANE_Y, 1), Support(bodies.PLANE_Z, 2)]
+
+
+def follow(problem, loads, observe, pressure=lambda load: load, first=0.05):
+    """[observe() at each of the loads]"""
+    newton = Newton(problem, RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm))
+    path = LoadPath(newton, pressure)
+    seen = {}
+    run_steps(path, loads[-1], StepSize(first, 1e-4, milestones=tuple(loads)), lambda step: seen.update({step.load: observe()}))
+    newton.destroy()
+    return [seen[load] for load in loads]
+
+
+def sphere_radius(P):
+    """Inner radius of the inflated sphere below its limit point, from the closed form."""
+
+    def f(stretch):
+        return 2 / stretch + 1 / (2 * stretch**4)
+
+    return brentq(lambda a: f((a**3 + 7) ** (1 / 3) / 2) - f(a) - P, 1.0, 1.8)
+
+
+def test_inflated_sphere(shared_directory):
+    mesh = bodies.build(shared_directory, "sphere", 0.4, bodies.sphere_octant, bodies.sphere_faces)
+    problem = MixedProblem(*mesh, NeoHookean(1.0), (bodies.INNER,), SYMMETRY)
+    loads = [0.1, 0.3, 0.5, 0.7]
+    radii = follow(problem, loads, lambda: (6 * problem.cavity_volume() / np.pi) ** (1 / 3))
+    # the exact formula itself against the tabulated values
+    assert [sphere_radius(P) for P in loads] == pytest.approx([1.03041551, 1.10556673, 1.21288815, 1.40224705], abs=1e-8)
+    assert radii == pytest.approx([sphere_radius(P) for P in loads], rel=1e-3)
+
+
+def capped_tube(P):
+    """(inner radius, axial stretch) of the infinite capped tube: radial equilibrium and thrust P pi a^2."""
+    from scipy.optimize import fsolve
+
+    r, w = np.polynomial.legendre.leggauss(40)
+
+    def residual(x):
+        a, stretch = x
+        b = np.sqrt(a * a + 3 / stretch)
+        radius = (b - a) / 2 * r + (a + b) / 2
+        weight = (b - a) / 2 * w
+        R = np.sqrt(1 + stretch * (radius**2 - a**2))
+        srr, spp, szz = (R / (radius * stretch)) ** 2, (radius / R) ** 2, stretch**2
+        return [np.sum(weight * (spp - srr) / radius) - P, np.sum(weight * (2 * szz - srr - spp) * radius)]
+
+    return fsolve(residual, [1 + P / 2, 1.0], xtol=1e-12)
+
+
+def test_capped_tube(shared_directory):
+    mesh = bodies.build(shared_directory, "capsule", 0.5, bodies.capsule_octant, bodies.capsule_faces)
+    problem = MixedProblem(*mesh, NeoHookean(1.0), (bodies.INNER,), SYMMETRY)
+    X = problem.nodes[: problem.owned_nodes]
+    radius = np.hypot(X[:, 1], X[:, 2])
+    inner = np.flatnonzero((X[:, 0] < 1.0) & (radius < 1.001))
+
+    def middle():
+        rows = problem.mesh.comm.allgather((X[inner], problem.displacement()[inner]))
+        Xs, us = (np.concatenate(part) for part in zip(*rows))
+        a = np.hypot(Xs[:, 1] + us[:, 1], Xs[:, 2] + us[:, 2]).mean()
+        return [a, 1 + np.sum(Xs[:, 0] * us[:, 0]) / np.sum(Xs[:, 0] ** 2)]
+
+    assert list(capped_tube(0.3)) == pytest.approx([1.27865588, 1.01267626], abs=1e-7)
+    loads = [0.1, 0.3]
+    for P, (a, stretch) in zip(loads, follow(problem, loads, middle)):
+        assert [a, stretch] == pytest.approx(capped_tube(P), rel=1e-3)
+
+
+def test_torsion_and_stretch_of_a_cylinder(shared_directory):
+    mesh = bodies.build(shared_directory, "cylinder", 0.5, bodies.cylinder, bodies.cylinder_faces)
+    stretch, twist = 1.2, 0.5
+
+    def motion(X, load):
+        """The exact deformation at a fraction of the final stretch and twist per length."""
+        lam, psi = 1 + load * (stretch - 1), load * twist
+        angle, shrink = psi * X[:, 0], lam**-0.5
+        c, s = np.cos(angle), np.sin(angle)
+        y, z = shrink * (c * X[:, 1] - s * X[:, 2]), shrink * (s * X[:, 1] + c * X[:, 2])
+        return np.stack([lam * X[:, 0], y, z], axis=1) - X
+
+    supports = [Support(bodies.PLANE_X, None, motion), Support(bodies.END, None, motion)]
+    problem = MixedProblem(*mesh, NeoHookean(1.0), (), supports)
+    [(force, moment)] = follow(problem, [1.0], lambda: problem.reaction(bodies.END, 0.0), pressure=lambda load: 0.0, first=0.2)
+    a2 = 1 / stretch
+    assert moment[0] == pytest.approx(np.pi * twist / (2 * stretch), rel=1e-3)
+    assert force[0] == pytest.approx(np.pi * a2 * (stretch**2 - 1 / stretch) - np.pi * twist**2 * a2**2 / 4, rel=2e-3)
+    exact = motion(problem.nodes, 1.0)
+    error = problem.mesh.comm.allreduce(np.abs(problem.displacement() - exact).max(), op=MPI.MAX)
+    assert error < 2e-3

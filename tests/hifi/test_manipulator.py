@@ -1,0 +1,155 @@
+"""Whole bodies: symmetry, agreement of ranks, section frames and walls on the shipped mesh."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from base import se3
+from base.errors import ConvergenceError
+from geometry import Manipulator, Segment
+from geometry.designfile import read_design
+from geometry.mesh import mesh_manipulator
+from hifi.manipulator import ManipulatorSolve
+from tests import reference_case
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def reference():
+    design = read_design(reference_case.DATA / "reference.toml")
+    solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
+    yield solve
+    solve.destroy()
+
+
+def meshed(manipulator, directory, size=3.0):
+    comm = MPI.COMM_WORLD
+    if comm.rank == 0:
+        mesh_manipulator(manipulator, size, directory)
+    comm.barrier()
+    return directory / "manipulator.msh"
+
+
+def set_positions(problem, positions):
+    array = problem.array.copy()
+    array[problem.displacement_dofs] = positions - problem.nodes
+    problem.set_array(array)
+
+
+def test_section_frames_measure_a_prescribed_screw(reference):
+    """Frames of an exact screw differ from the screw's by one constant motion, so their strains are exact."""
+    k, e = np.array([0.02, 0.03, -0.01]), np.array([1.1, 0.02, 0.01])
+    X = reference.problem.nodes
+    poses = se3.exp_pose(X[:, :1] * np.concatenate([k, e]))
+    section = np.column_stack([np.zeros(len(X)), X[:, 1:]])
+    set_positions(reference.problem, np.einsum("nij,nj->ni", poses[:, :3, :3], section) + poses[:, :3, 3])
+    strains = reference.sections.segment_strains(reference.sections.frames())
+    # |k| and k.e do not depend on the constant motion between the two lines
+    assert np.linalg.norm(strains.k, axis=1) == pytest.approx(np.linalg.norm(k), rel=2e-3)
+    assert np.sum(strains.k * strains.e, axis=1) == pytest.approx(k @ e, rel=5e-3)
+    assert strains.k == pytest.approx(np.tile(k, (2, 1)), abs=2e-3)
+
+
+def test_section_frames_follow_a_rigid_motion_exactly(reference):
+    motion = se3.exp_pose([0.4, -0.3, 1.0, 5.0, 2.0, -1.0])
+    set_positions(reference.problem, se3.transform(motion, reference.problem.nodes))
+    frames = reference.sections.frames()[1:]
+    expected = np.tile(motion, (len(frames), 1, 1))
+    expected[:, :3, 3] += np.outer(reference.sections.stations[1:], motion[:3, 0])
+    assert frames == pytest.approx(expected, abs=1e-10)
+    assert reference.stretch.largest() == pytest.approx(1.0, abs=1e-10)
+    walls = reference.walls.distances()
+    if walls is not None:
+        assert walls == pytest.approx([gap[3] for gap in reference.walls.gaps], abs=1e-9)
+
+
+def test_walls_that_pass_through_each_other_are_negative(reference):
+    """Squeezing x to 60 % keeps gaps open in proportion; a shift of the second block's walls closes them."""
+    X = reference.problem.nodes
+    set_positions(reference.problem, X * [0.6, 1.0, 1.0])
+    walls = reference.walls.distances()
+    middle = reference.manipulator.segments[0]
+    x_middle = middle.chamber_positions.mean()
+    moved = X.copy()
+    beyond = X[:, 0] - middle.cot * X[:, 1] * np.sign(X[:, 2]) > x_middle
+    for side in (1, -1):
+        normal = np.array([middle.sin, -side * middle.cot * middle.sin, 0.0])
+        moved -= np.outer(beyond & (side * X[:, 2] > 0), 2.0 * middle.gap * normal)
+    if walls is not None:
+        assert (walls > 0).all() and (walls < [gap[3] for gap in reference.walls.gaps]).all()
+    set_positions(reference.problem, moved)
+    walls = reference.walls.distances()
+    if walls is not None:
+        # walls shifted through each other by a gap's width: each point lies that far behind the other wall
+        assert walls[:2] == pytest.approx([-middle.gap] * 2, rel=0.05)
+
+
+def test_mirror_design_mirrors(shared_directory):
+    """The mirror image on the mirrored mesh: e and k change sign like polar and axial vectors."""
+    manipulator = Manipulator((Segment("one-sided", 60.0, 2),))
+    path = meshed(manipulator, shared_directory)
+    results = []
+    for body, flip in ((manipulator, 1.0), (manipulator.mirrored, -1.0)):
+        solve = ManipulatorSolve(body, path, flip_y=flip < 0)
+        solve.run(0.02)
+        results.append(solve.measure())
+        solve.destroy()
+    a, b = results
+    assert b.frames[-1, :3, 3] == pytest.approx(a.frames[-1, :3, 3] * [1, -1, 1], abs=1e-7)
+    assert b.strains.k == pytest.approx(a.strains.k * [-1, 1, -1], abs=1e-8)
+    assert b.strains.e == pytest.approx(a.strains.e * [1, -1, 1], abs=1e-8)
+
+
+def test_free_segments_keep_their_symmetry(shared_directory):
+    """Twisting does not bend (k2 = k3 = 0); a one-sided segment at 90 degrees does not twist (k1 = k3 = 0)."""
+    twisting = Segment("twisting", 60.0, 2, gap=2.0, cavity_floor=0.5, chamber_height=5.5)
+    bending = Segment("one-sided", 90.0, 3)
+    for name, segment, large in (("twisting", twisting, 0), ("bending", bending, 1)):
+        folder = shared_directory / name
+        solve = ManipulatorSolve(Manipulator((segment,)), meshed(Manipulator((segment,)), folder))
+        solve.run(0.02)
+        k = solve.measure().strains.k[0]
+        solve.destroy()
+        others = np.delete(k, large)
+        # k1 > 0 for angle < 90; k2 > 0 bends away from the chambers
+        assert k[large] > 0.003
+        assert np.abs(others).max() < (0.05 if large == 0 else 0.02) * np.linalg.norm(k)
+
+
+def test_work_of_the_pressure_is_stored(reference):
+    """int P dV over the steps (cubic rule through the accepted states) equals the elastic energy."""
+    states = [(0.0, reference.problem.cavity_volume())]
+    reference.run(0.02, lambda m: states.append((m.pressure, m.volume)), milestones=np.linspace(0, 0.02, 11)[1:])
+    from scipy.interpolate import CubicSpline
+
+    P, V = np.array(states).T
+    work = P[-1] * V[-1] - P[0] * V[0] - CubicSpline(P, V).integrate(0.0, P[-1])
+    assert work == pytest.approx(reference.problem.stored_energy(), rel=1e-5)
+
+
+def test_pressure_out_of_reach_keeps_what_converged(shared_directory):
+    soft = Manipulator((Segment("one-sided", 90.0, 1, wall=0.5, top_wall=0.5, side_wall=0.5, chamber_height=8.0),))
+    solve = ManipulatorSolve(soft, meshed(soft, shared_directory))
+    reached = []
+    with pytest.raises(ConvergenceError, match="stopped at load"):
+        solve.run(2.0, lambda m: reached.append(m.pressure))
+    assert reached and solve.path.load == reached[-1] < 2.0
+    solve.destroy()
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts its own two ranks")
+def test_two_ranks_agree_with_one(tmp_path):
+    out = tmp_path / "two.json"
+    command = [sys.executable, "-m", "pneunet", "run", "-n", "2", "--", sys.executable, "-m", "tests.reference_case", str(out)]
+    subprocess.run(command, check=True, cwd=ROOT, timeout=300)
+    two, one = json.loads(out.read_text()), reference_case.numbers()
+    assert set(one) == set(two)
+    for name, value in one.items():
+        scale = 0.01 if "per_mm" in name else 1.0  # absolute where symmetry makes a number zero
+        assert two[name] == pytest.approx(value, rel=1e-8, abs=1e-8 * scale), name

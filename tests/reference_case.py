@@ -1,0 +1,43 @@
+"""One FE case on a shipped mesh: `python -m tests.reference_case OUT.json`, on any number of ranks.
+
+Its numbers must be the same on one and two ranks, on Debian 12 and 13, natively and in the container.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+DATA = Path(__file__).resolve().parent / "data"
+
+
+def numbers():
+    """{name: number} of the converged state at 20 kPa; the same on all ranks (None for walls off rank 0)."""
+    from geometry.designfile import read_design
+    from hifi.manipulator import ManipulatorSolve
+    from hifi.solver import NewtonOptions
+
+    design = read_design(DATA / "reference.toml")
+    # two decades below what is compared
+    solve = ManipulatorSolve(design.manipulator, DATA / "reference.msh", newton_options=NewtonOptions(relative_tolerance=1e-11))
+    solve.run(design.pressure)
+    measured = solve.measure()
+    out = {"volume_mm3": measured.volume, "largest_stretch": measured.largest_stretch}
+    out |= {f"tip_{axis}_mm": value for axis, value in zip("xyz", measured.frames[-1, :3, 3])}
+    for i, (e, k) in enumerate(zip(measured.strains.e, measured.strains.k), start=1):
+        out |= {f"segment_{i}_e{j}": v for j, v in enumerate(e, start=1)}
+        out |= {f"segment_{i}_k{j}_per_mm": v for j, v in enumerate(k, start=1)}
+    out |= {"smallest_wall_distance_mm": float(measured.walls.min())} if measured.walls is not None else {}
+    solve.destroy()
+    return out
+
+
+def main(path):
+    from mpi4py import MPI
+
+    result = numbers()
+    if MPI.COMM_WORLD.rank == 0:
+        Path(path).write_text(json.dumps(result, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
