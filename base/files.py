@@ -62,8 +62,14 @@ def read_columns(path, columns):
     missing = [c for c in columns if c not in header]
     if missing:
         raise InputError(f"{path}: column '{missing[0]}' is missing")
-    index = [header.index(c) for c in columns]
-    return np.array([[float(row[i]) for i in index] for row in rows])
+    out = np.empty((len(rows), len(columns)))
+    for i, row in enumerate(rows):
+        for j, column in enumerate(columns):
+            try:
+                out[i, j] = float(row[header.index(column)])
+            except (ValueError, IndexError):
+                raise InputError(f"{path} row {i + 2}: '{column}' is not a number: make the file again") from None
+    return out
 
 
 def output_directory(path):

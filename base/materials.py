@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from base.errors import InputError
-from base.tables import from_table, quantity, to_table
+from base.tables import as_table, from_table, quantity, to_table
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,12 @@ LAWS = {NeoHookean.law: NeoHookean}
 
 
 def material_from_table(table, where):
-    table = dict(table)
+    table = as_table(table, where)
     law = table.pop("law", NeoHookean.law)
-    if law not in LAWS:
+    if law not in tuple(LAWS):
         raise InputError(f"{where}: unknown law '{law}': known laws are {', '.join(LAWS)}")
     return from_table(LAWS[law], table, where)
 
 
 def material_to_table(material):
     return {"law": material.law, **to_table(material)}
-
-

@@ -6,6 +6,7 @@ Reading refuses unknown keys and wrong units in one line that names the key and 
 
 import dataclasses
 import difflib
+import json
 import math
 import tomllib
 from pathlib import Path
@@ -39,9 +40,16 @@ def read_toml(path):
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
 
 
+def as_table(value, where):
+    """A copy of a TOML table; InputError when something else stands in its place."""
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: must be a table of keys, not {value!r}")
+    return dict(value)
+
+
 def refuse_unknown(table, known, where):
     """InputError for the first key of `table` that is not in `known`, with the nearest known one."""
-    for key in table:
+    for key in as_table(table, where):
         if key in known:
             continue
         same_quantity = [k for k in known if k.rsplit("_", 1)[0] == key.rsplit("_", 1)[0] or k.rsplit("_", 1)[0] == key]
@@ -64,8 +72,6 @@ def number(value, key, where, integer=False):
 def from_table(cls, table, where, **preset):
     """An instance of dataclass `cls` from a TOML table; fields without `unit` metadata come in by `preset`."""
     fields = {file_key(f): f for f in dataclasses.fields(cls) if "unit" in f.metadata}
-    if not isinstance(table, dict):
-        raise InputError(f"{where}: must be a table of keys, not {table!r}")
     refuse_unknown(table, fields, where)
     values = dict(preset)
     for key, field in fields.items():
@@ -104,8 +110,8 @@ def _value(value):
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-        return f'"{escaped}"'
+        # JSON's escapes are TOML's too; JSON lets the delete character stand
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (list, tuple)) or hasattr(value, "tolist"):
         items = value.tolist() if hasattr(value, "tolist") else value
         return "[" + ", ".join(_value(v) for v in items) + "]" if isinstance(items, (list, tuple)) else _value(items)

@@ -90,4 +90,5 @@ check_distribution
 install_debian_packages
 step stack "$here/setup.sh" "$here/requirements.txt" -- install_python_packages
 [ "${1:-}" = stack ] || step pneunet "$root/pyproject.toml" -- install_pneunet
-if [ -n "$changed" ]; then say "done"; else say "everything is there, nothing to install"; fi
+# What it took, for `make bench ONLY=setup`: one line for each run that installed something.
+if [ -n "$changed" ]; then echo "$SECONDS" >>"$venv/setup-seconds"; say "done in $SECONDS s"; else say "everything is there, nothing to install"; fi

@@ -22,7 +22,7 @@ FIT_POINTS = 31
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc of uniform curvature (1/mm) and torsion (rad/mm) placed on points; frames (3, 3) at its ends; rms in mm."""
+    """An arc of uniform curvature (1/mm) and torsion (rad/mm) on points; frames (3, 3) at its ends; rms in mm."""
 
     length: float
     curvature: float
@@ -178,7 +178,9 @@ def _twist_of_run(target, pieces, arcs, run):
     if seen:
         shown = turn_about_axis(before, after)
         turn = (shown - given + np.pi) % (2 * np.pi) - np.pi
-        note = f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest is taken"
+        note = (
+            f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest is taken"
+        )
         if len(free) > 1:
             note += "; shared evenly among neighbours"
     free_length = sum(pieces[i].length for i in free)

@@ -25,7 +25,8 @@ class Guess:
 
 
 def responses(segment, pressures, law):
-    """(stretch, curvature 1/mm, twist rad/mm) per deformed length, each (m,), at pressures (m,) in MPa; nan beyond a limit load."""
+    """Stretch, curvature (1/mm) and twist (rad/mm) per deformed length, (3, m), at pressures (m,) in MPa; nan beyond a
+    limit load."""
     out = np.full((3, len(pressures)), np.nan)
     for j, pressure in enumerate(pressures):
         try:
@@ -41,7 +42,7 @@ def _twist(segment, strains):
 
 
 def active_length(segment, count):
-    """Undeformed active length, mm, of `count` chambers, a real number: `Segment.active_length` between whole numbers."""
+    """Undeformed active length, mm, of a real number of chambers: `Segment.active_length` between whole ones."""
     return count * segment.pitch - segment.gap / segment.sin
 
 

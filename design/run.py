@@ -10,10 +10,12 @@ from base.errors import InputError
 from base.files import output_directory, write_csv
 from base.record import write_record
 from design.extraction import extract
-from design.inverse import OBJECTIVES, PAIRED, solve
+from design.inverse import solve
 from design.metrics import compare
+from design.problem import OBJECTIVES, PAIRED
 from design.segmentation import NOTE, split
-from design.targets import HELICAL, POINT_COLUMNS, TWISTING, read_target
+from design.targetfile import POINT_COLUMNS, read_target
+from design.targets import HELICAL, TWISTING
 from geometry.designfile import Design, write_design
 from geometry.parameters import TWISTING as TWISTING_KIND
 from reduced.model import AnalyticModel, predict
@@ -55,7 +57,12 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
         ],
     }
     design = Design(
-        solution.manipulator, solution.pressure, name=target.name, base_pose=solution.base_pose, target="target.csv", result=result
+        solution.manipulator,
+        solution.pressure,
+        name=target.name,
+        base_pose=solution.base_pose,
+        target="target.csv",
+        result=result,
     )
     directory = output_directory(directory)
     write_csv(directory / "target.csv", POINT_COLUMNS, target.points)
@@ -78,15 +85,20 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
 def describe(piece):
     """One line about an `Extracted` piece, in the field's units."""
     table = piece.table()
-    names = [("tau_rad_per_mm", "tau", "rad/mm"), ("curvature_per_m", "curvature", "1/m"), ("torsion_rad_per_m", "torsion", "rad/m"),
-             ("cylinder_curvature_per_m", "cylinder curvature", "1/m"), ("pitch_mm", "pitch", "mm")]  # fmt: skip
+    names = [
+        ("tau_rad_per_mm", "tau", "rad/mm"),
+        ("curvature_per_m", "curvature", "1/m"),
+        ("torsion_rad_per_m", "torsion", "rad/m"),
+        ("cylinder_curvature_per_m", "cylinder curvature", "1/m"),
+        ("pitch_mm", "pitch", "mm"),
+    ]
     rates = ", ".join(f"{name} {table[key]:.4g} {unit}" for key, name, unit in names if key in table)
     note = f" ({piece.note})" if piece.note else ""
     return f"{piece.kind:8s} {piece.length:6.1f} mm, {rates}{note}"
 
 
 def predicted(kind, strains):
-    """What the law predicts for the active part of a piece's segment, by file key; rates per deformed length beside the strains."""
+    """What the law predicts for the active part of a piece's segment, by file key; rates per deformed length."""
     table = {
         "stretch": float(strains.stretch),
         "k1_rad_per_mm": float(strains.k[0]),
@@ -110,10 +122,11 @@ def summary(design, solution, errors, seconds):
     for i, (segment, piece) in enumerate(zip(design.manipulator.segments, design.result["piece"]), start=1):
         base = f"{segment.base_thickness:6.2f}" if segment.kind != TWISTING_KIND else "     -"
         yield (
-            f"  {i} {segment.kind:9s}{segment.angle:6.1f}  {segment.chambers:8d}  {segment.chamber_height:6.2f}  {base}  "
-            f"{segment.gap:6.2f}  {segment.length:6.1f}   {_rates(piece)}   {_rates(piece['predicted'])}"
+            f"  {i} {segment.kind:9s}{segment.angle:6.1f}  {segment.chambers:8d}  {segment.chamber_height:6.2f}  "
+            f"{base}  {segment.gap:6.2f}  {segment.length:6.1f}   {_rates(piece)}   {_rates(piece['predicted'])}"
         )
-    yield f"pressure {1e3 * design.pressure:.2f} kPa, undeformed length {design.manipulator.length:.1f} mm, {seconds:.0f} s"
+    length = f"undeformed length {design.manipulator.length:.1f} mm"
+    yield f"pressure {1e3 * design.pressure:.2f} kPa, {length}, {seconds:.0f} s"
     yield "errors of the reduced prediction:"
     for text in errors.lines():
         yield "  " + text

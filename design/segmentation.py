@@ -17,7 +17,10 @@ GRID = 18  # joints tried along the curve
 TOLERANCE = 0.001  # of the curve's length: a fit this good is good enough
 PRICE = 0.1  # of a rate, in units of a misfit of TOLERANCE over the whole curve
 RATES = {TWISTING: 1, BENDING: 2, HELICAL: 3}
-NOTE = "simple automatic split (no twist is sought where the curve is not straight): give [[piece]] tables to split it yourself"
+NOTE = (
+    "simple automatic split (no twist is sought where the curve is not straight): "
+    "give [[piece]] tables to split it yourself"
+)
 
 
 def split(points):
@@ -64,7 +67,9 @@ def _refined(points, kinds, ends, step, shortest, length):
     """Joints moved by halves of the grid's step, down to 1/16, while that lowers the misfit of the two pieces."""
 
     def misfit(i):
-        return _misfit(points, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(points, ends[i], ends[i + 1], kinds[i], length)
+        return _misfit(points, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(
+            points, ends[i], ends[i + 1], kinds[i], length
+        )
 
     ends = list(ends)
     for move in (step / 2, step / 4, step / 8, step / 16):

@@ -52,7 +52,7 @@ def wrap(radius, slope, z_from, z_to, turns, offset=6.0):
 
 
 def octopus():
-    """Twist 0.01 pi rad/mm over 50 mm; 18 1/m over 30 mm; helix of cylinder curvature 70 1/m, pitch 90 mm over 100 mm."""
+    """0.01 pi rad/mm over 50 mm; 18 1/m over 30 mm; helix of cylinder curvature 70 1/m, pitch 90 mm over 100 mm."""
     curvature, torsion = helix_frenet(0.070, 90.0)
     return rod([(50, 0.01 * np.pi, 0), (30, 0, 0.018), (100, torsion, curvature)])
 

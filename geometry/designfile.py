@@ -7,7 +7,7 @@ import numpy as np
 from base.errors import InputError
 from base.files import write_text
 from base.materials import material_from_table, material_to_table
-from base.tables import from_table, number, read_toml, refuse_unknown, to_table, toml_text
+from base.tables import as_table, from_table, number, read_toml, refuse_unknown, to_table, toml_text
 from geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
@@ -50,9 +50,9 @@ def read_design(path):
         raise InputError(f"{path}: segments are written [[segment]], with double brackets")
     segments = []
     for i, row in enumerate(data["segment"], start=1):
-        row = dict(row)
-        own = row.pop("material", None)
         where = f"{path} [[segment]] {i}"
+        row = as_table(row, where)
+        own = row.pop("material", None)
         segment_material = material_from_table(own, f"{where} material") if own is not None else material
         segments.append(from_table(Segment, row, where, material=segment_material))
     try:
@@ -66,7 +66,7 @@ def read_design(path):
         base_pose=_base_pose(data.get("base", {}), f"{path} [base]"),
         mesh_size=float(mesh_size),
         target=str(data.get("target", "")),
-        result=data.get("result", {}),
+        result=as_table(data.get("result", {}), f"{path} [result]"),
     )
 
 

@@ -71,10 +71,11 @@ class Segment:
                 f"chamber_height_mm = {self.chamber_height:g}: the chamber (top at z = {self.chamber_top:g} mm) does not rise above "
                 f"the core (z = {self.core_top:g} mm)"
             )
-        if self.end_wall < 0.5:
+        if self.end_wall < 0.5 - 1e-9:
+            needed = np.ceil(100 * (self.end_margin + 0.5 - self.end_wall) - 1e-6) / 100
             raise InputError(
                 f"end_margin_mm = {self.end_margin:g} leaves {self.end_wall:.2g} mm to close the channel's end: "
-                f"at least {self.end_margin + 0.5 - self.end_wall:.3g} mm is needed with gap_mm = {self.gap:g}"
+                f"at least {needed:g} mm is needed with gap_mm = {self.gap:g}"
             )
         if self.length > 2000:
             raise InputError(f"chambers = {self.chambers}: the segment would be {self.length:.0f} mm long (at most 2000)")
@@ -82,7 +83,7 @@ class Segment:
     @property
     def key(self):
         """Hashable identity of the cell: everything that the strains of the middle of a long segment depend on."""
-        return replace(self, chambers=1, end_margin=1.0)
+        return replace(self, chambers=1, end_margin=1.0 + self.gap / self.sin / 2)
 
     @property
     def mirrored(self):
@@ -175,8 +176,9 @@ class Manipulator:
         if not self.segments:
             raise InputError("segment: at least one [[segment]] is needed")
         for i, (a, b) in enumerate(zip(self.segments, self.segments[1:]), start=1):
-            shared = min(a.core_top, b.core_top) - max(a.core_bottom, b.core_bottom)
-            if shared < max(a.channel_height, b.channel_height) or min(a.width, b.width) <= max(a.channel_width, b.channel_width):
+            half_height, channel_width = max(a.channel_height, b.channel_height) / 2, max(a.channel_width, b.channel_width)
+            covered = max(a.core_bottom, b.core_bottom) < -half_height and half_height < min(a.core_top, b.core_top)
+            if not covered or min(a.width, b.width) <= channel_width:
                 raise InputError(f"segment {i} and {i + 1}: the channel of one does not fit into the core of the other")
 
     @property

@@ -1,5 +1,8 @@
 """The only place that knows the difference between dolfinx 0.5 (Debian 12) and 0.9 (Debian 13)."""
 
+import logging
+from contextlib import contextmanager
+
 import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
@@ -10,10 +13,23 @@ from dolfinx.io import gmshio
 from base.errors import InputError
 
 OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
-COMPILE_ARGUMENTS = ["-O2", "-march=native"]
+#: timeout in s, ten times as long as a form takes: another run may be compiling it into the same cache just now
+COMPILER = {"cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 200}
 VERSION = dolfinx.__version__
 
 
+@contextmanager
+def quiet_compiler():
+    """Compiling sends every gcc line to the root logger, which prints it to standard error if it has no handler."""
+    handler = logging.NullHandler()
+    logging.getLogger().addHandler(handler)
+    try:
+        yield
+    finally:
+        logging.getLogger().removeHandler(handler)
+
+
+@quiet_compiler()
 def mixed_space(mesh, degree=2):
     """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure on tetrahedra."""
     if OLD:
@@ -28,6 +44,7 @@ def mixed_space(mesh, degree=2):
     return fem.functionspace(mesh, basix.ufl.mixed_element([u, p]))
 
 
+@quiet_compiler()
 def lagrange_space(mesh, degree, components=1):
     """Continuous Lagrange space, scalar or vector."""
     if OLD:
@@ -37,16 +54,16 @@ def lagrange_space(mesh, degree, components=1):
     return fem.functionspace(mesh, ("Lagrange", degree, shape))
 
 
+@quiet_compiler()
 def compile_form(form):
     """A compiled form with the project's compiler arguments."""
-    options = {"cffi_extra_compile_args": COMPILE_ARGUMENTS}
-    return fem.form(form, **({"jit_params": options} if OLD else {"jit_options": options}))
+    return fem.form(form, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER}))
 
 
+@quiet_compiler()
 def expression(mesh, ufl_expression, points):
     """Callable: local cells (n,) -> values (n, points, components) of a UFL expression at reference points."""
-    options = {"cffi_extra_compile_args": COMPILE_ARGUMENTS}
-    compiled = fem.Expression(ufl_expression, points, **({"jit_params": options} if OLD else {"jit_options": options}))
+    compiled = fem.Expression(ufl_expression, points, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER}))
 
     def evaluate(cells):
         values = compiled.eval(cells) if OLD else compiled.eval(mesh, cells)

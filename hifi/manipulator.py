@@ -187,8 +187,9 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
     solve.destroy()
     if failure:
         raise ConvergenceError(
-            f"pressure_kPa = {pressure * KPA:g} was not reached: stopped at {last[0].pressure * KPA:.4g} kPa ({result.reason}); "
-            f"the result up to there is in {out}"
+            f"pressure_kPa = {pressure * KPA:g} was not reached: stopped at {last[0].pressure * KPA:.4g} kPa ({result.reason}), "
+            f"usually by ballooning, touching walls or too coarse a mesh; the result up to there is in {out}; "
+            "try less pressure, thicker walls or a smaller mesh_size_mm"
         )
     return last[0]
 

@@ -3,8 +3,8 @@
 A long inflated body rotates by many times what its walls strain, and both the extrapolation of displacements and the
 linearised rotation in a Newton step are wrong by the rotation squared. Stations along X1 carry rigid motions; what is
 extrapolated, or added, is the *relative* motion of neighbouring stations (composed exactly in SE(3)) and the position
-in the station's frame. Nodes blend the motions of their two neighbouring stations with hat functions. One station
-makes it a plain update with one rigid motion taken out; the same code serves spheres and manipulators.
+in the section's frame. Between stations motions are interpolated along the geodesic of SE(3). One station makes it a
+plain update with one rigid motion taken out; the same code serves spheres and manipulators.
 """
 
 import numpy as np
@@ -38,9 +38,9 @@ class RodCoordinates:
                 total[:, column] += np.bincount(i[: self.owned], (w * rows)[:, column], minlength=self.stations)
         return self.comm.allreduce(total, op=MPI.SUM)
 
-    def _blend(self, values_at):
-        """Hat-weighted sum of a nodal quantity (n, 3) evaluated with the left and with the right station's data."""
-        return (1 - self.fraction) * values_at(self.left) + self.fraction * values_at(self.right)
+    def _interpolate(self, start, between):
+        """Poses (n, 4, 4) at the nodes: `start` (stations, 4, 4) continued by fractions of `between` (stations, 6)."""
+        return start[self.left] @ se3.exp_pose(self.fraction * between[self.right] * (self.right > self.left)[:, None])
 
     def motions(self, positions):
         """Rigid motions (stations, 4, 4) that carry the undeformed stations' material closest to `positions` (n, 3)."""
@@ -49,39 +49,26 @@ class RodCoordinates:
         sums = self._sum_over_stations(np.hstack([np.ones((len(X), 1)), X, x, outer]))
         return np.array([FitMoments(row).pose() for row in sums])
 
-    def rotations(self, positions):
-        """Smooth nodal rotations (n, 3, 3): the stations' ones, interpolated along the geodesic between neighbours."""
-        R = self.motions(positions)[:, :3, :3]
-        between = se3.log_rotation(np.swapaxes(R[:-1], 1, 2) @ R[1:]) if self.stations > 1 else np.zeros((1, 3))
-        interval = np.minimum(self.left, len(between) - 1)
-        return R[self.left] @ se3.exp_rotation(self.fraction * between[interval])
+    def sections(self, positions):
+        """Section motions (n, 4, 4) at the nodes' own x, from the stations' ones."""
+        motions = self.motions(positions)
+        return self._interpolate(motions, se3.log_pose(_relative(motions)))
 
     def extrapolate(self, histories, coefficients):
         """Positions (n, 3) extrapolated from earlier ones (m of (n, 3)) with Lagrange coefficients (m,)."""
-        motions = [self.motions(x) for x in histories]
-        # relative motion of each station with respect to the one before; the first one's to the ground
-        relative = [np.concatenate([g[:1], se3.inverse_pose(g[:-1]) @ g[1:]]) for g in motions]
+        relative = [_relative(self.motions(x)) for x in histories]
         # logs relative to the latest state stay far from pi
         latest = relative[-1]
         logs = [se3.log_pose(se3.inverse_pose(latest) @ h) for h in relative]
         predicted = latest @ se3.exp_pose(sum(c * q for c, q in zip(coefficients, logs)))
-        for i in range(1, self.stations):
-            predicted[i] = predicted[i - 1] @ predicted[i]
-        inverse = [se3.inverse_pose(g) for g in motions]
-
-        def values(i):
-            local = sum(
-                c * (np.einsum("nij,nj->ni", g[i, :3, :3], x) + g[i, :3, 3]) for c, g, x in zip(coefficients, inverse, histories)
-            )
-            return np.einsum("nij,nj->ni", predicted[i, :3, :3], local) + predicted[i, :3, 3]
-
-        return self._blend(values)
+        local = sum(c * _apply(se3.inverse_pose(self.sections(x)), x) for c, x in zip(coefficients, histories))
+        return _apply(self._interpolate(_chain(predicted), se3.log_pose(predicted)), local)
 
     def retract(self, positions, increment):
         """Positions (n, 3) after a displacement increment (n, 3), equal to their sum to first order.
 
-        V_i: spatial twist that fits the increment best at station i. With M_i the motion of station i,
-        M_(i+1) = M_i exp(V_(i+1) - V_i): the relative motion of neighbours is integrated exactly.
+        V(s): spatial twist that fits the increment at the stations, linear between them. The motion M of the sections
+        obeys M' = M hat(V'), so M_(i+1) = M_i exp(V_(i+1) - V_i): relative motions are integrated exactly.
         """
         x, d = positions[: self.owned], increment[: self.owned]
         scale = max(np.abs(self.comm.allreduce(np.abs(positions).max(initial=0.0), op=MPI.MAX)), 1e-300)
@@ -100,12 +87,25 @@ class RodCoordinates:
             matrix[3:, 3:] = n * np.eye(3)
             twists[i] = np.linalg.solve(matrix, np.concatenate([row[16:19], row[13:16]]))
         twists[:, :3] /= scale
-        steps = se3.exp_pose(np.diff(twists, axis=0, prepend=np.zeros((1, 6))))
-        for i in range(1, self.stations):
-            steps[i] = steps[i - 1] @ steps[i]
+        change = np.diff(twists, axis=0, prepend=np.zeros((1, 6)))
+        motion = self._interpolate(_chain(se3.exp_pose(change)), change)
+        twist = twists[self.left] + self.fraction * (twists[self.right] - twists[self.left])
+        rest = increment - twist[:, 3:] - np.cross(twist[:, :3], positions)
+        return _apply(motion, positions + rest)
 
-        def values(i):
-            rest = increment - twists[i, 3:] - np.cross(twists[i, :3], positions)
-            return np.einsum("nij,nj->ni", steps[i, :3, :3], positions + rest) + steps[i, :3, 3]
 
-        return self._blend(values)
+def _relative(motions):
+    """Each station's motion with respect to the one before; the first one's with respect to the ground."""
+    return np.concatenate([motions[:1], se3.inverse_pose(motions[:-1]) @ motions[1:]])
+
+
+def _chain(relative):
+    """Inverse of `_relative`."""
+    out = relative.copy()
+    for i in range(1, len(out)):
+        out[i] = out[i - 1] @ out[i]
+    return out
+
+
+def _apply(poses, points):
+    return np.einsum("nij,nj->ni", poses[:, :3, :3], points) + poses[:, :3, 3]

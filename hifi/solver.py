@@ -102,7 +102,7 @@ class Newton:
         self._rotation_then = self._rotations()
 
     def _rotations(self):
-        return self.coordinates.rotations(self.coordinates.nodes + self.problem.displacement())
+        return self.coordinates.sections(self.coordinates.nodes + self.problem.displacement())[:, :3, :3]
 
     def apply_inverse(self, right):
         """Approximate K^-1 right (a PETSc vector) at the current state, as an array over owned and ghost dofs.

@@ -15,8 +15,12 @@ MPI_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 
 
 class Parser(argparse.ArgumentParser):
+    def __init__(self, **options):
+        # --pressure is not taken for --pressure-kPa: the unit is part of the name
+        super().__init__(**options, allow_abbrev=False)
+
     def error(self, message):
-        raise InputError(f"{self.prog}: {message}")
+        raise InputError(f"{message} ({self.prog} --help tells more)")
 
 
 def pressures(text):
@@ -26,9 +30,9 @@ def pressures(text):
         try:
             value = float(word)
         except ValueError:
-            raise InputError(f"--pressure-kPa: '{word}' is not a number; write for instance 10,20,30") from None
+            raise argparse.ArgumentTypeError(f"'{word}' is not a number; write for instance 10,20,30") from None
         if not 0 < value <= 2000:
-            raise InputError(f"--pressure-kPa: {value:g} must lie in 0..2000 kPa")
+            raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..2000 kPa")
         values.append(value * 1e-3)
     return values
 
@@ -36,7 +40,7 @@ def pressures(text):
 def one_pressure(text):
     values = pressures(text)
     if len(values) != 1:
-        raise InputError("--pressure-kPa: one number is wanted here")
+        raise argparse.ArgumentTypeError("one number is wanted here")
     return values[0]
 
 
@@ -46,7 +50,7 @@ def mesh_size(text):
     except ValueError:
         value = float("nan")
     if not 0.1 <= value <= 20:
-        raise InputError(f"--mesh-size-mm: '{text}' must be a number in 0.1..20")
+        raise argparse.ArgumentTypeError(f"'{text}' must be a number in 0.1..20")
     return value
 
 
@@ -138,7 +142,7 @@ def run_solve(a):
 def run_report(a):
     from design.report import write_report
 
-    say(f"report: {write_report(a.directory, say=say)}")
+    write_report(a.directory, say=say)
 
 
 def run_ranks(a):

@@ -29,6 +29,8 @@ SETTINGS = {
     "OMPI_MCA_btl": "^tcp",
     # a command that ends with an error has said why itself; no page about it from mpirun (5 cannot be told)
     "OMPI_MCA_orte_execute_quiet": "1",
+    # a rank that waits gives its core to the one it waits for
+    "OMPI_MCA_mpi_yield_when_idle": "1",
     # one thread a rank, and no remarks on the machine's topology
     "OMP_NUM_THREADS": "1",
     "HWLOC_HIDE_ERRORS": "2",

@@ -28,3 +28,12 @@ def shared_directory(tmp_path_factory):
 
     comm = MPI.COMM_WORLD
     return Path(comm.bcast(str(tmp_path_factory.mktemp("shared")) if comm.rank == 0 else None, root=0))
+
+
+def pytest_runtest_logreport(report):
+    """A test that fails on one rank would leave the others waiting in a collective call: stop them all."""
+    if report.failed and os.environ.get("OMPI_COMM_WORLD_SIZE", "1") != "1":
+        from mpi4py import MPI
+
+        print(report.longreprtext, file=sys.stderr, flush=True)
+        MPI.COMM_WORLD.Abort(1)

@@ -7,7 +7,8 @@ from base import se3
 from base.strains import helix_frenet
 from design.extraction import extract, fit_arc, turn_about_axis
 from design.segmentation import split
-from design.targets import SHIPPED, Piece, Target, read_target
+from design.targetfile import SHIPPED, read_target
+from design.targets import Piece, Target
 
 
 def rod(*pieces, spacing=1.0):
@@ -57,7 +58,9 @@ def test_octopus_by_fitting_alone():
     curvature, torsion = helix_frenet(0.07, 90)
     assert helical.curvature == pytest.approx(curvature, rel=1e-3) and helical.twist == pytest.approx(torsion, rel=1e-3)
     table = helical.table()
-    assert table["cylinder_curvature_per_m"] == pytest.approx(70, rel=1e-3) and table["pitch_mm"] == pytest.approx(90, rel=1e-3)
+    assert table["cylinder_curvature_per_m"] == pytest.approx(70, rel=1e-3) and table["pitch_mm"] == pytest.approx(
+        90, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("turn", [0.5, -2.5, 3.6])

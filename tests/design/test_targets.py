@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from base.errors import InputError
-from design.targets import SHIPPED, read_target
+from design.targetfile import SHIPPED, read_target
 from examples import make_targets
 
 GOOD = "x_mm,y_mm,z_mm\n" + "".join(f"{10 * i},0,0\n" for i in range(6))
@@ -46,7 +46,10 @@ def test_toml_with_inline_points_frames_and_everything(tmp_path):
     target = read_target(toml(tmp_path, """
         name = "all"
         points_mm = [[0, 0, 0], [10, 0, 0], [20, 0, 0], [30, 0, 0]]
-        frames = [[[1,0,0],[0,1,0],[0,0,1]], [[1,0,0],[0,1,0],[0,0,1]], [[1,0,0],[0,1,0],[0,0,1]], [[1,0,0],[0,1,0],[0,0,1]]]
+        frames = [
+            [[1,0,0], [0,1,0], [0,0,1]], [[1,0,0], [0,1,0], [0,0,1]],
+            [[1,0,0], [0,1,0], [0,0,1]], [[1,0,0], [0,1,0], [0,0,1]],
+        ]
         pressure_range_kPa = [20, 40]
         base = { direction = [2, 0, 0], width_direction = [0, 0, 1] }
         material = { mu_MPa = 0.2 }
@@ -86,8 +89,14 @@ def test_shipped_target_by_name_with_own_keys(tmp_path):
         ("x_mm,y_mm\n0,0\n", "column 'z_mm' is missing"),
         ("0,0,0\n.01,0,0\n.02,0,0\n.03,0,0\n", "are its coordinates in mm?"),
         ("x_mm,y_mm,z_mm,t1x,t1y,t1z\n" + "".join(f"{9 * i},0,0,1,0,0\n" for i in range(5)), "column 't2x' is missing"),
-        ("x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(f"{9 * i},0,0,1,0,0,1,0,0\n" for i in range(5)), "orthogonal"),
-        ("x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(f"{9 * i},0,0,0,1,0,1,0,0\n" for i in range(5)), "t1 does not point"),
+        (
+            "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(f"{9 * i},0,0,1,0,0,1,0,0\n" for i in range(5)),
+            "orthogonal",
+        ),
+        (
+            "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(f"{9 * i},0,0,0,1,0,1,0,0\n" for i in range(5)),
+            "t1 does not point",
+        ),
     ],
 )
 def test_bad_csv(tmp_path, text, words):
@@ -120,7 +129,10 @@ PIECE = '[[piece]]\nkind = "{}"\nlength_mm = 50\n{}'
         ('points = "curve.csv"\n[piece]\nkind = "bending"', "double brackets"),
         ('points = "curve.csv"\n' + PIECE.format("curly", ""), "write 'twisting', 'bending' or 'helical'"),
         ('points = "curve.csv"\n[[piece]]\nkind = "bending"', "key 'length_mm' is missing"),
-        ('points = "curve.csv"\n' + PIECE.format("bending", "").replace("50", "70"), "add up to 70 mm but the curve is 50 mm"),
+        (
+            'points = "curve.csv"\n' + PIECE.format("bending", "").replace("50", "70"),
+            "add up to 70 mm but the curve is 50 mm",
+        ),
         ('points = "curve.csv"\n' + PIECE.format("bending", "curvature_per_mm = 1"), "write 'curvature_per_m'"),
         ('points = "curve.csv"\n' + PIECE.format("bending", "curvature_per_m = -1"), "must be larger than 0"),
         ('points = "curve.csv"\n' + PIECE.format("twisting", "tau_rad_per_m = 1"), "write 'tau_rad_per_mm'"),

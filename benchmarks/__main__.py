@@ -1,0 +1,88 @@
+"""`python -m benchmarks [--only PART] [--snapshot]`: measure figures into out/bench/results.json.
+
+Parts merge into the file; results.meta.json beside it says for each part when, at which revision, on which machine and
+how fast a fixed calibration loop ran. --snapshot copies both to docs/ and rewrites the table docs/figures.md.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from base.files import write_text
+from base.record import machine, revision
+from benchmarks import chain
+
+ROOT = Path(__file__).resolve().parent.parent
+OUT = ROOT / "out" / "bench"
+#: part -> (function returning {key: number}, what it needs and measures)
+PARTS = {
+    "setup": (chain.setup, "set-up on a fresh Debian 13 root, taken when the container image is built (make image)"),
+    "ranks": (chain.ranks, "largest relative difference between the reference case on 1 and on 2 ranks"),
+    "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
+    "test": (chain.test, "make test with a cold form cache, wall seconds"),
+}
+MEANING = {
+    "setup_seconds": "fresh Debian 13 root to a working `.venv`: apt and PyPI downloads included, wall s",
+    "demo_seconds": "`make demo` after set-up, 2 ranks, wall s",
+    "test_seconds": "`make test` after set-up with a cold form cache, wall s",
+    "demo_reduced_vs_fe_rms_percent_of_length": "demo: reduced against FE centreline at FE's last pressure, RMS of points paired by arc length, % of length",
+    "demo_fe_vs_target_rms_percent_of_length": "demo: FE centreline against the target, RMS paired by arc length, % of length",
+    "demo_pressure_reached_kPa": "demo: pressure the FE solution reached, kPa",
+    "rank_agreement_rel": "reference case on 1 and 2 ranks: largest difference of a result, relative to the larger of itself and 1 (0.01 for 1/mm)",
+}
+
+
+def calibration():
+    """Best of 5 wall seconds of a fixed pure-Python loop: how fast this machine is right now."""
+    best = float("inf")
+    for _ in range(5):
+        start = time.perf_counter()
+        sum(i * i for i in range(1_000_000))
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def merge(path, entries):
+    known = json.loads(path.read_text()) if path.exists() else {}
+    write_text(path, json.dumps(known | entries, indent=1, sort_keys=True) + "\n")
+
+
+def snapshot():
+    """Copy the results to docs/ and write the table of figures."""
+    for name in ("results.json", "results.meta.json"):
+        shutil.copyfile(OUT / name, ROOT / "docs" / name)
+    results = json.loads((OUT / "results.json").read_text())
+    meta = json.loads((OUT / "results.meta.json").read_text())
+    lines = ["# Figures", "", "Made by `make bench` and `python -m benchmarks --snapshot`; do not edit.", ""]
+    lines += ["| key | value | what it is |", "|---|---|---|"]
+    lines += [f"| `{key}` | {value:.4g} | {MEANING[key]} |" for key, value in sorted(results.items())]
+    lines += ["", "| part | date | revision | machine | calibration loop, s |", "|---|---|---|---|---|"]
+    for part, m in sorted(meta.items()):
+        lines.append(f"| {part} | {m['date']} | {m['revision']} | {m['machine']['processor']}, {m['machine']['cores']} cores | {m['calibration_seconds']:.3f} |")
+    write_text(ROOT / "docs" / "figures.md", "\n".join(lines) + "\n")
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="benchmarks")
+    parser.add_argument("--only", choices=PARTS, help="; ".join(f"{k}: {v[1]}" for k, v in PARTS.items()))
+    parser.add_argument("--snapshot", action="store_true", help="publish out/bench to docs/")
+    a = parser.parse_args()
+    if a.snapshot:
+        snapshot()
+        return
+    for part in [a.only] if a.only else PARTS:
+        print(f"bench: {part}", flush=True)
+        loop = calibration()
+        figures = PARTS[part][0]()
+        merge(OUT / "results.json", figures)
+        facts = {"date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "revision": revision(), "machine": machine()}
+        merge(OUT / "results.meta.json", {part: {**facts, "calibration_seconds": loop, "keys": sorted(figures)}})
+        for key, value in figures.items():
+            print(f"  {key} = {value:.6g}", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""Figures of the whole chain: set-up, demo, tests, agreement of ranks."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def setup():
+    """Seconds that containers/setup.sh took on a fresh Debian 13 root, as it noted while the image was built."""
+    script = '. containers/tool.sh; tool="$(container_tool)"; in_image "$1" cat /opt/pneunet/.venv/setup-seconds'
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(["bash", "-c", script, "bash", folder], cwd=ROOT, capture_output=True, text=True)
+    if done.returncode or not done.stdout.split():
+        sys.exit(f"bench: no image to ask; run make image first ({done.stderr.strip()[-200:]})")
+    return {"setup_seconds": sum(float(word) for word in done.stdout.split())}
+
+
+def ranks():
+    """Largest relative difference between 1 and 2 ranks over the numbers of tests/reference_case.py."""
+    with tempfile.TemporaryDirectory() as folder:
+        results = []
+        for n in (1, 2):
+            out = Path(folder) / f"{n}.json"
+            command = [sys.executable, "-m", "pneunet", "run", "-n", str(n), "--", sys.executable, "-m", "tests.reference_case", str(out)]
+            subprocess.run(command, cwd=ROOT, check=True)
+            results.append(json.loads(out.read_text()))
+    one, two = results
+    scale = {name: 0.01 if "per_mm" in name else 1.0 for name in one}
+    return {"rank_agreement_rel": max(abs(two[n] - v) / max(abs(v), scale[n]) for n, v in one.items())}
+
+
+def demo():
+    """`make demo` from an empty output folder."""
+    import shutil
+
+    shutil.rmtree(ROOT / "out" / "demo", ignore_errors=True)
+    start = time.perf_counter()
+    subprocess.run(["make", "demo"], cwd=ROOT, check=True)
+    seconds = time.perf_counter() - start
+    from design.comparison import Comparison
+    from design.rundata import read_run
+    from reduced.model import AnalyticModel
+
+    comparison = Comparison.of(read_run(ROOT / "out" / "demo"), AnalyticModel())
+    run = json.loads((ROOT / "out" / "demo" / "solve" / "run.json").read_text())
+    return {
+        "demo_seconds": seconds,
+        "demo_reduced_vs_fe_rms_percent_of_length": comparison.reduced_solved.percent(comparison.reduced_solved.rms),
+        "demo_fe_vs_target_rms_percent_of_length": comparison.solved_target.percent(comparison.solved_target.rms),
+        "demo_pressure_reached_kPa": run["pressure_reached_kPa"],
+    }
+
+
+def test():
+    """`make test` with a form cache of its own that starts empty."""
+    with tempfile.TemporaryDirectory() as cache:
+        start = time.perf_counter()
+        subprocess.run(["make", "test"], cwd=ROOT, check=True, env={**os.environ, "XDG_CACHE_HOME": cache})
+        return {"test_seconds": time.perf_counter() - start}

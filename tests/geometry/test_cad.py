@@ -1,0 +1,118 @@
+"""CAD volumes against closed forms derived here.
+
+A plan parallelogram of normal thickness t between y = -b/2 and b/2 has area t b / sin(angle), wherever it is cut by
+planes of constant y. So, per side of the core and chamber: outer block above the core t_c W / sin; cavity t b / sin
+times its height; what it shares with the channel, t w / sin times the height from its floor to the channel's top. The
+channel runs one pitch per chamber, and through the joints from one segment's last cell to the next one's first.
+"""
+
+from dataclasses import replace
+
+import pytest
+
+from base.errors import InputError
+from geometry import Manipulator, Segment, cad
+from tests.cases import CASES
+
+ONE_SIDED, TWISTING = Segment("one-sided", 60.0, 3), Segment("twisting", 60.0, 3, cavity_floor=0.5, chamber_height=5.5)
+
+
+def built(*segments):
+    """CAD volumes (body, cavity) in mm3 of a manipulator."""
+    with cad.session():
+        volumes = cad.build(Manipulator(segments))
+    return volumes["body_mm3"], volumes["cavity_mm3"]
+
+
+def outer_volume(s):
+    core = s.length * s.width * (s.core_top - s.core_bottom)
+    block = (s.cavity_thickness + 2 * s.wall) / s.sin * s.width * (s.chamber_top - s.core_top)
+    return core + len(s.sides) * s.chambers * block
+
+
+def cavity_volume(s):
+    channel = s.chambers * s.pitch * s.channel_width * s.channel_height
+    plan = s.cavity_thickness / s.sin  # per unit of width
+    shared = plan * s.channel_width * (s.channel_height / 2 - s.cavity_floor)
+    return channel + len(s.sides) * s.chambers * (plan * (s.width - 2 * s.side_wall) * s.chamber_height - shared)
+
+
+def joint_volume(s):
+    """Channel through one end of a segment that is joined."""
+    return s.channel_width * s.channel_height * (s.length - s.chambers * s.pitch) / 2
+
+
+@pytest.mark.parametrize("angle", [45.0, 60.0, 90.0, 120.0])
+@pytest.mark.parametrize("kind", ["one-sided", "twisting"])
+@pytest.mark.parametrize("floor", [1.0, 0.4, 0.0])
+def test_volumes_of_one_segment(kind, angle, floor):
+    s = Segment(kind, angle, 3, cavity_floor=floor, chamber_height=4.5)
+    body, cavity = built(s)
+    assert cavity == pytest.approx(cavity_volume(s), rel=1e-9)
+    assert body == pytest.approx(outer_volume(s) - cavity_volume(s), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "segment",
+    [
+        replace(ONE_SIDED, cavity_floor=-1.0),
+        replace(ONE_SIDED, chambers=1),
+        replace(TWISTING, chambers=1, angle=120.0),
+        replace(ONE_SIDED, channel_width=10.0, gap=8.0, end_margin=3.0),
+        replace(ONE_SIDED, width=20.0, side_wall=2.0, roof=0.4, base_thickness=1.1, top_wall=1.7, wall=0.6, gap=3.1),
+    ],
+    ids=["floor on the channel's", "one chamber", "one pair", "channel as wide as the cavity", "all walls different"],
+)
+def test_volumes_at_the_limits(segment):
+    assert built(segment) == pytest.approx((outer_volume(segment) - cavity_volume(segment), cavity_volume(segment)))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_volumes_of_the_reference_cases(name):
+    s = CASES[name](angle=60.0, chambers=26 if name == "one_sided_long" else 3)
+    assert built(s) == pytest.approx((outer_volume(s) - cavity_volume(s), cavity_volume(s)))
+
+
+def test_a_manipulator_is_the_sum_of_its_segments_and_the_channel_through_the_joints():
+    other = replace(ONE_SIDED, angle=110.0, chambers=2, channel_width=3.0, channel_height=1.6, cavity_floor=0.8)
+    segments = (TWISTING, ONE_SIDED, other)
+    body, cavity = built(*segments)
+    joints = joint_volume(TWISTING) + 2 * joint_volume(ONE_SIDED) + joint_volume(other)
+    assert cavity == pytest.approx(sum(map(cavity_volume, segments)) + joints, rel=1e-9)
+    assert body + cavity == pytest.approx(sum(map(outer_volume, segments)), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["one_sided_w10", "twist_w12"])
+def test_mirror_designs_have_equal_volumes(name):
+    s = CASES[name](angle=50.0, chambers=3)
+    assert built(s.mirrored, ONE_SIDED.mirrored) == pytest.approx(built(s, ONE_SIDED), rel=1e-9)
+
+
+def spoilt(segment, **change):
+    """A segment whose validation was passed by: what the CAD's own checks are for."""
+    segment = replace(segment)
+    for name, value in change.items():
+        object.__setattr__(segment, name, value)
+    return segment
+
+
+@pytest.mark.parametrize(
+    ("segment", "message"),
+    [
+        (spoilt(ONE_SIDED, side_wall=0.0), "breaks through the outer surface"),
+        (spoilt(ONE_SIDED, top_wall=-0.5), "breaks through the outer surface"),
+        (spoilt(ONE_SIDED, base_thickness=0.0), "breaks through the outer surface"),
+        (spoilt(TWISTING, side_wall=-1.0), "breaks through the outer surface|pieces instead of 1"),
+        (spoilt(TWISTING, wall=-0.2, gap=2.0), "breaks through the outer surface|pieces instead of 1"),
+    ],
+)
+def test_a_cavity_that_breaks_through_is_refused(segment, message):
+    with pytest.raises(InputError, match=message):
+        built(segment)
+
+
+def test_an_error_leaves_no_session_behind():
+    before = built(ONE_SIDED)
+    with pytest.raises(InputError):
+        built(spoilt(ONE_SIDED, side_wall=0.0))
+    assert built(ONE_SIDED) == before

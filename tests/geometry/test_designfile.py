@@ -1,0 +1,96 @@
+"""design.toml: complete and re-runnable, and strict about what it does not know."""
+
+import numpy as np
+import pytest
+
+from base import se3
+from base.errors import InputError
+from base.materials import NeoHookean
+from geometry import Manipulator, Segment
+from geometry.designfile import Design, read_design, write_design
+
+MATERIAL = NeoHookean(mu=0.25, name='soft "A"', source="a \\ b")
+DESIGN = Design(
+    Manipulator(
+        (
+            Segment("twisting", 61.23456789, 3, cavity_floor=0.5, gap=2.0, material=MATERIAL),
+            Segment("one-sided", 90.0, 4, end_margin=1.5, material=MATERIAL),
+            Segment("one-sided", 120.0, 1, material=NeoHookean(mu=0.5)),
+        )
+    ),
+    0.0364,
+    name="three pieces",
+    base_pose=se3.make_pose(se3.exp_rotation([0.3, -0.2, 1.0]), [1.0, 2.0, 3.0]),
+    mesh_size=1.5,
+    target="a b.csv",
+    result={"errors": {"rms_mm": 0.5}, "piece": [{"kind": "twisting"}, {"kind": "bending"}]},
+)
+MINIMAL = """pressure_kPa = 20
+[material]
+mu_MPa = 0.3
+[[segment]]
+kind = "one-sided"
+angle_deg = 60
+chambers = 3
+"""
+
+
+def test_a_design_reads_back_as_it_was(tmp_path):
+    path = tmp_path / "a folder" / "design.toml"
+    write_design(path, DESIGN)
+    back = read_design(path)
+    assert back.manipulator == DESIGN.manipulator
+    assert back.base_pose == pytest.approx(DESIGN.base_pose, abs=1e-15)
+    for name in ("pressure", "name", "mesh_size", "target", "result"):
+        assert getattr(back, name) == getattr(DESIGN, name), name
+    first = path.read_text()
+    write_design(path, back)
+    assert path.read_text() == first
+
+
+def test_a_short_file_has_the_defaults(tmp_path):
+    path = tmp_path / "short.toml"
+    path.write_text(MINIMAL)
+    design = read_design(path)
+    assert design.manipulator.segments == (Segment("one-sided", 60.0, 3, material=NeoHookean(mu=0.3)),)
+    assert (design.pressure, design.mesh_size) == (0.02, 2.0)
+    assert (design.base_pose == np.eye(4)).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("pressure_kPa = 20", "pressure_MPa = 0.02", "key 'pressure_MPa' has the wrong unit: write 'pressure_kPa'"),
+        ("pressure_kPa = 20", "", "key 'pressure_kPa' is missing"),
+        ("pressure_kPa = 20", "pressure_kPa = 0", "pressure_kPa = 0 must lie in"),
+        ("pressure_kPa = 20", "pressure_kPa = 20\nmesh_size_mm = 0.01", "mesh_size_mm = 0.01 must lie in"),
+        ("pressure_kPa = 20", 'schema = "other"\npressure_kPa = 20', "schema = 'other' is not 'pneunet-design-1'"),
+        ("pressure_kPa = 20", "pressure_kPa = 20\nresult = 5", r"\[result\]: must be a table"),
+        ("[material]\nmu_MPa = 0.3", "", "key 'material' is missing"),
+        ("mu_MPa", "mu_kPa", r"\[material\]: key 'mu_kPa' has the wrong unit: write 'mu_MPa'"),
+        (MINIMAL, "pressure_kPa = 20\nsegment = [1]\nmaterial.mu_MPa = 0.3", r"\[\[segment\]\] 1: must be a table"),
+        ("mu_MPa = 0.3", "mu_MPa = 0.3\nlaw = [1]", r"\[material\]: unknown law '\[1\]': known laws are neo-Hookean"),
+        ("[[segment]]", "[segment]", r"\[\[segment\]\], with double brackets"),
+        ("chambers = 3", "chambers = 2.5", r"\[\[segment\]\] 1: 'chambers' must be a whole number"),
+        ("chambers = 3", "chambers = 0", r"\[\[segment\]\] 1: chambers = 0"),
+        ("angle_deg", "angel_deg", r"\[\[segment\]\] 1: unknown key 'angel_deg': did you mean 'angle_deg'"),
+        ("angle_deg = 60", "angle_rad = 1", r"\[\[segment\]\] 1: key 'angle_rad' has the wrong unit"),
+        ("chambers = 3", 'chambers = 3\nmaterial = "soft"', r"\[\[segment\]\] 1 material: must be a table"),
+        ("chambers = 3", "chambers = 3\n[base]\norigin_mm = [1, 2]", r"\[base\]: 'origin_mm' must be numbers"),
+        ("chambers = 3", "chambers = 3\n[base]\norigin_mm = [1, 2, nan]", r"\[base\]: 'origin_mm' must be numbers"),
+        (
+            "chambers = 3",
+            "chambers = 3\n[base]\nrotation = [[1,0,0],[0,1,0],[0,0,-1]]",
+            r"\[base\]: 'rotation' is not a rotation matrix",
+        ),
+        ("chambers = 3", "chambers = 3\n[base]\norigin = [1, 2, 3]", r"\[base\]: key 'origin' has the wrong unit"),
+        ("chambers = 3", "chambers = 3\n[[base]]\n", r"\[base\]"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path, old, new, message):
+    path = tmp_path / "bad.toml"
+    assert old in MINIMAL
+    path.write_text(MINIMAL.replace(old, new))
+    with pytest.raises(InputError, match=message) as error:
+        read_design(path)
+    assert str(error.value).startswith(str(path)) and "\n" not in str(error.value)

@@ -1,0 +1,113 @@
+"""Meshes: as large as the CAD, closed, tagged, and refused where they would be unfit for use."""
+
+import json
+from dataclasses import replace
+
+import gmsh
+import numpy as np
+import pytest
+
+from base.errors import InputError
+from geometry import Manipulator, Segment, cad, mesh
+
+ONE_SIDED, TWISTING = Segment("one-sided", 70.0, 2), Segment("twisting", 60.0, 2, gap=2.0, cavity_floor=0.5)
+BOTH = Manipulator((TWISTING, replace(ONE_SIDED, width=10.0)))
+
+
+@pytest.fixture(scope="module")
+def meshed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("a mesh")
+    return folder, mesh.mesh_manipulator(BOTH, 4.0, folder)
+
+
+def facets(tag):
+    """Corner coordinates (n, 3, 3) of the tagged triangles of the current gmsh model."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    where = dict(zip(tags, coordinates.reshape(-1, 3)))
+    entities = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
+    nodes = np.concatenate([gmsh.model.mesh.getElementsByType(2, entity)[1] for entity in entities])
+    return np.array([where[n] for n in nodes]).reshape(-1, 3, 3)
+
+
+def test_facts_agree_with_the_cad(meshed):
+    folder, facts = meshed
+    assert facts["mesh_volume_mm3"] == pytest.approx(facts["body_mm3"], rel=1e-9)
+    assert facts["cavity_closed"] and facts["nothing_intersects"]
+    assert 0 < facts["smallest_quality"] <= facts["quality_5_percent"] <= 1
+    first, last = BOTH.segments
+    areas = facts["areas"]
+    assert areas["base_mm2"] == pytest.approx(first.width * (first.core_top - first.core_bottom))
+    assert areas["tip_mm2"] == pytest.approx(last.width * (last.core_top - last.core_bottom))
+    assert facts["mesh_size_mm"] == 4.0 and facts["segments"] == mesh.segment_tables(BOTH)
+    assert json.loads((folder / "mesh.json").read_text()) == facts
+    assert sorted(p.name for p in folder.iterdir()) == ["manipulator.msh", "manipulator.step", "mesh.json"]
+
+
+def test_tagged_faces_lie_where_their_names_say(meshed):
+    folder, facts = meshed
+    first, last = BOTH.segments
+    with cad.session():
+        gmsh.merge(str(folder / "manipulator.msh"))
+        assert facets(cad.BASE)[..., 0] == pytest.approx(0.0, abs=1e-9)
+        assert facets(cad.TIP)[..., 0] == pytest.approx(BOTH.length)
+        cavity = np.concatenate([facets(cad.CAVITY), facets(cad.CHANNEL)])
+        channel = facets(cad.CHANNEL)
+        volumes = gmsh.model.getPhysicalGroups(3)
+    # the divergence theorem on the tagged surface gives the CAD's cavity volume: it is all there, and closed
+    normals = np.cross(cavity[:, 1] - cavity[:, 0], cavity[:, 2] - cavity[:, 0]) / 2
+    assert abs(np.einsum("nk,nk->", cavity.mean(axis=1), normals) / 3) == pytest.approx(facts["cavity_mm3"])
+    assert normals.sum(axis=0) == pytest.approx(0.0, abs=1e-9)
+    # the channel's wall: on its four sides, from half a pitch before the first chamber to half a pitch after the last
+    x, y, z = np.moveaxis(channel, 2, 0)
+    on_side = np.ptp(y, axis=1) < 1e-9
+    assert abs(y[on_side]) == pytest.approx(2.0) and abs(z[~on_side]) == pytest.approx(1.0)
+    assert np.ptp(z[~on_side], axis=1) == pytest.approx(0.0, abs=1e-9)
+    ends = first.chamber_positions[0] - first.pitch / 2, BOTH.length - last.end_wall
+    assert (x.min(), x.max()) == pytest.approx(ends)
+    assert volumes == [(3, cad.BODY), (3, cad.BODY + 1)]
+
+
+def test_the_same_mesh_again(meshed, tmp_path):
+    again = mesh.mesh_manipulator(BOTH, 4.0, tmp_path)
+    assert {k: v for k, v in again.items() if k != "seconds"} == {k: v for k, v in meshed[1].items() if k != "seconds"}
+
+
+@pytest.mark.parametrize("angle", [45.0, 135.0])
+def test_mirror_designs_mesh_to_equal_volumes(angle, tmp_path):
+    facts = mesh.mesh_manipulator(Manipulator((replace(ONE_SIDED, angle=angle),)), 4.0, tmp_path)
+    other = mesh.mesh_manipulator(Manipulator((replace(ONE_SIDED, angle=180 - angle),)), 4.0, tmp_path)
+    assert facts["mesh_volume_mm3"] == pytest.approx(other["mesh_volume_mm3"], rel=1e-9)
+    for name, area in facts["areas"].items():
+        assert area == pytest.approx(other["areas"][name], rel=1e-9), name
+
+
+@pytest.mark.parametrize("size", [0.02, 0.1])
+def test_a_mesh_beyond_any_memory_is_refused_at_once(size, tmp_path):
+    long = Manipulator((replace(ONE_SIDED, chambers=30),))
+    with pytest.raises(InputError, match="mesh_size_mm = .* choose a coarser mesh"):
+        mesh.mesh_manipulator(long, size, tmp_path / "mesh")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_left_of_a_mesh_that_fails(tmp_path, monkeypatch):
+    monkeypatch.setattr(mesh, "open_edges", lambda nodes: 1)
+    with pytest.raises(InputError, match="not closed"):
+        mesh.mesh_manipulator(Manipulator((ONE_SIDED,)), 4.0, tmp_path)
+    assert list(tmp_path.glob("*.msh")) == list(tmp_path.glob("*.json")) == list(tmp_path.glob(".*")) == []
+
+
+def test_quality_and_volume_of_tetrahedra():
+    regular = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
+    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    volumes, quality = mesh.tet_volumes_and_quality(
+        np.stack([regular, corner, corner[[1, 0, 2, 3]], corner * [1, 1, 0]])
+    )
+    assert abs(volumes) == pytest.approx([8 / 3, 1 / 6, 1 / 6, 0]) and volumes[1] == -volumes[2] > 0
+    assert abs(quality[0]) == pytest.approx(1.0) and quality[3] == 0.0 and quality[2] == -quality[1] < 0
+
+
+def test_open_edges_of_a_tetrahedrons_surface():
+    closed = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+    assert mesh.open_edges(closed) == 0
+    assert mesh.open_edges(closed[1:]) == 3  # a hole
+    assert mesh.open_edges(np.concatenate([closed, [[0, 1, 4]]])) == 3  # a fin

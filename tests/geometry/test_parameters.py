@@ -1,0 +1,139 @@
+"""Segment and Manipulator: what is refused, and lengths in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from base.errors import InputError
+from base.materials import NeoHookean
+from geometry import Manipulator, Segment
+from tests.cases import CASES
+
+ONE_SIDED, TWISTING = Segment("one-sided", 60.0, 3), Segment("twisting", 60.0, 3)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"kind": "bending"}, "kind = 'bending' .*'one-sided' or 'twisting'"),
+        ({"angle": 29.9}, r"angle_deg = 29.9 is outside 30\.\.150"),
+        ({"angle": 151.0}, "angle_deg = 151 "),
+        ({"angle": float("nan")}, "angle_deg = nan "),
+        ({"chambers": 0}, "chambers = 0: .* at least 1"),
+        ({"chambers": 1000}, "chambers = 1000: .*at most 2000"),
+        ({"gap": -1.0}, "gap_mm = -1 must be larger than 0"),
+        ({"wall": 0.0}, "wall_mm = 0 must be larger than 0"),
+        ({"wall": float("nan")}, "wall_mm = nan "),
+        ({"width": 0.012}, "width_mm = 0.012 .*in metres"),
+        ({"side_wall": 6.0}, "side_wall_mm = 6: .* width_mm = 12"),
+        ({"channel_width": 10.5}, "channel_width_mm = 10.5 is wider than the cavity"),
+        ({"cavity_floor": 1.2}, r"cavity_floor_mm = 1.2 must lie in -1\.\.1 "),
+        ({"cavity_floor": -1.2}, r"cavity_floor_mm = -1.2 must lie in -1\.\.1 "),
+        ({"kind": "twisting", "cavity_floor": -0.2}, r"cavity_floor_mm = -0.2 must lie in 0\.\.1 "),
+        ({"chamber_height": 0.5, "top_wall": 0.5}, "chamber_height_mm = 0.5: .* does not rise above the core"),
+        ({"angle": 90.0, "gap": 4.0}, r"end_margin_mm = 2 .* at least 2\.5 mm is needed with gap_mm = 4"),
+    ],
+)
+def test_segments_that_cannot_be_built_are_refused(change, message):
+    with pytest.raises(InputError, match=message) as error:
+        replace(ONE_SIDED, **change)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "name",
+    "chamber_height cavity_thickness wall gap top_wall side_wall base_thickness roof channel_width channel_height "
+    "end_margin width".split(),
+)
+def test_every_dimension_must_be_positive(name):
+    with pytest.raises(InputError, match=f"^{name}_mm = -0.5 must be larger than 0$"):
+        replace(ONE_SIDED, **{name: -0.5})
+
+
+def test_the_fix_that_an_error_names_is_accepted():
+    with pytest.raises(InputError, match="end_margin_mm = 1 .* at least 1.03 mm"):
+        replace(ONE_SIDED, angle=90.0, gap=1.05, end_margin=1.0)
+    assert replace(ONE_SIDED, angle=90.0, gap=1.05, end_margin=1.03).end_wall >= 0.5
+
+
+@pytest.mark.parametrize("angle", [45.0, 60.0, 90.0, 120.0])
+@pytest.mark.parametrize("chambers", [1, 4])
+def test_lengths_in_closed_form(angle, chambers):
+    """What is t across the chambers is t/sin(angle) along the axis; slanted ends need W/2 |cot(angle)| more."""
+    s = Segment("one-sided", angle, chambers, cavity_thickness=2.5, wall=0.8, gap=1.2, width=11.0, end_margin=1.9)
+    sin, cot = np.sin(np.radians(angle)), 1 / np.tan(np.radians(angle))
+    assert s.pitch == pytest.approx(5.3 / sin)
+    assert s.active_length == pytest.approx(((chambers - 1) * 5.3 + 4.1) / sin)
+    assert s.length == pytest.approx(s.active_length + 2 * (5.5 * abs(cot) + 1.9))
+    positions = s.chamber_positions
+    assert len(positions) == chambers and np.diff(positions) == pytest.approx(5.3 / sin)
+    assert positions.mean() == pytest.approx(s.length / 2)
+    # the outermost corner of a chamber is end_margin away from the end, the channel's end by the end wall
+    assert positions[0] - 4.1 / sin / 2 - 5.5 * abs(cot) == pytest.approx(1.9)
+    assert positions[0] - s.pitch / 2 == pytest.approx(s.end_wall)
+
+
+def test_heights_follow_the_kind():
+    for s, bottom, lowest in ((ONE_SIDED, -3.0, -3.0), (TWISTING, -2.0, -6.0)):
+        assert (s.core_top, s.cavity_top, s.chamber_top) == (2.0, 5.0, 6.0)
+        assert (s.core_bottom, s.chamber_bottom) == (bottom, lowest)
+    assert ONE_SIDED.sides == (1,) and TWISTING.sides == (1, -1)
+
+
+def test_chambers_across_the_beam_are_exactly_straight():
+    assert Segment("one-sided", 90.0, 2).cot == 0.0
+
+
+def test_mirror_image():
+    mirrored = ONE_SIDED.mirrored
+    assert mirrored.angle == 120.0 and mirrored.mirrored == ONE_SIDED
+    assert mirrored.cot == pytest.approx(-ONE_SIDED.cot) and mirrored.length == pytest.approx(ONE_SIDED.length)
+    assert Manipulator((ONE_SIDED, TWISTING)).mirrored.segments == (mirrored, TWISTING.mirrored)
+
+
+@pytest.mark.parametrize("segment", [ONE_SIDED, replace(ONE_SIDED, angle=90.0, gap=4.0, end_margin=3.0)])
+def test_cells_are_the_same_whatever_the_ends_and_the_number(segment):
+    assert segment.key == replace(segment, chambers=9, end_margin=20.0).key
+    assert segment.key != replace(segment, wall=1.1).key
+    assert segment.key != replace(segment, material=NeoHookean(mu=0.2)).key
+
+
+def test_manipulator_adds_up():
+    m = Manipulator([ONE_SIDED, TWISTING, replace(ONE_SIDED, angle=100.0, chambers=5)])
+    lengths = [s.length for s in m.segments]
+    assert m.length == pytest.approx(sum(lengths)) and m.chambers == 11
+    assert m.starts == pytest.approx([0.0, lengths[0], lengths[0] + lengths[1]])
+    pieces = m.pieces
+    assert [i for i, _ in pieces] == [None, 0, None, None, 1, None, None, 2, None]
+    assert sum(length for _, length in pieces) == pytest.approx(m.length)
+    assert [length for i, length in pieces if i is not None] == pytest.approx([s.active_length for s in m.segments])
+
+
+def test_joints_that_do_not_fit_are_refused():
+    with pytest.raises(InputError, match="at least one \\[\\[segment\\]\\]"):
+        Manipulator(())
+    tall = replace(ONE_SIDED, channel_height=6.0, chamber_height=8.0)
+    with pytest.raises(InputError, match="segment 2 and 3: the channel of one does not fit into the core"):
+        Manipulator((ONE_SIDED, ONE_SIDED, tall))
+    with pytest.raises(InputError, match="segment 1 and 2: the channel"):
+        Manipulator((replace(ONE_SIDED, width=20.0, channel_width=12.0), ONE_SIDED))
+    # enough core in common, but higher than the first one's channel: that one's end would stand open
+    low = replace(ONE_SIDED, base_thickness=5.0, roof=0.3, channel_height=1.0, cavity_floor=0.5)
+    with pytest.raises(InputError, match="segment 1 and 2: the channel"):
+        Manipulator((ONE_SIDED, low))
+
+
+def test_reference_cases_have_the_heights_and_pitches_of_their_table():
+    """Core, chamber, cavity heights and normal pitch as the table of reference cases gives them."""
+    table = {
+        "one_sided_w10": (-3, 2, 6, 1, 5, 5),
+        "twist_w10": (-2, 2, 6, 1, 5, 5),
+        "twist_w12": (-2, 2, 7, 0.5, 6, 6),
+        "twist_w15": (-2, 2, 9, 0.5, 8, 5),
+        "one_sided_long": (-3, 2, 4, -1, 3, 5),
+    }
+    for name, expected in table.items():
+        s = CASES[name](angle=60.0, chambers=5)
+        heights = (s.core_bottom, s.core_top, s.chamber_top, s.cavity_floor, s.cavity_top)
+        assert (*heights, s.pitch * s.sin) == pytest.approx(expected), name
