@@ -61,7 +61,9 @@ def snapshot():
     lines += [f"| `{key}` | {value:.4g} | {MEANING[key]} |" for key, value in sorted(results.items())]
     lines += ["", "| part | date | revision | machine | calibration loop, s |", "|---|---|---|---|---|"]
     for part, m in sorted(meta.items()):
-        lines.append(f"| {part} | {m['date']} | {m['revision']} | {m['machine']['processor']}, {m['machine']['cores']} cores | {m['calibration_seconds']:.3f} |")
+        lines.append(
+            f"| {part} | {m['date']} | {m['revision']} | {m['machine']['processor']}, {m['machine']['cores']} cores | {m['calibration_seconds']:.3f} |"
+        )
     write_text(ROOT / "docs" / "figures.md", "\n".join(lines) + "\n")
 
 
@@ -78,7 +80,11 @@ def main():
         loop = calibration()
         figures = PARTS[part][0]()
         merge(OUT / "results.json", figures)
-        facts = {"date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "revision": revision(), "machine": machine()}
+        facts = {
+            "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "revision": revision(),
+            "machine": machine(),
+        }
         merge(OUT / "results.meta.json", {part: {**facts, "calibration_seconds": loop, "keys": sorted(figures)}})
         for key, value in figures.items():
             print(f"  {key} = {value:.6g}", flush=True)

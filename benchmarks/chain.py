@@ -27,7 +27,19 @@ def ranks():
         results = []
         for n in (1, 2):
             out = Path(folder) / f"{n}.json"
-            command = [sys.executable, "-m", "pneunet", "run", "-n", str(n), "--", sys.executable, "-m", "tests.reference_case", str(out)]
+            command = [
+                sys.executable,
+                "-m",
+                "pneunet",
+                "run",
+                "-n",
+                str(n),
+                "--",
+                sys.executable,
+                "-m",
+                "tests.reference_case",
+                str(out),
+            ]
             subprocess.run(command, cwd=ROOT, check=True)
             results.append(json.loads(out.read_text()))
     one, two = results

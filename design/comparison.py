@@ -130,9 +130,7 @@ def verdict(run, comparison):
         sentence += f"; it stopped short of the design pressure, {plain(design.pressure * 1e3)} kPa"
     depth = overlap(run)
     if depth > 0:
-        sentence += (
-            f". Walls overlap by up to {depth:.2f} mm, so the finite element shape is not what a real body would take"
-        )
+        sentence += f". Walls overlap by up to {depth:.2f} mm, so the finite element shape is not what a real body would take"
     return sentence + "."
 
 

@@ -36,9 +36,7 @@ class SheetView:
         left, bottom, width, height = rectangle
         sheet_width, sheet_height = figure.get_size_inches()
         self.scale = scale
-        self.ax = figure.add_axes(
-            [left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height]
-        )
+        self.ax = figure.add_axes([left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height])
         x, y = x - right / scale, y - up / scale
         self.x0, self.x1 = x - width / 2 / scale, x + width / 2 / scale
         self.y0, self.y1 = y - height / 2 / scale, y + height / 2 / scale

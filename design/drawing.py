@@ -77,8 +77,7 @@ def drawing_figure(design):
     scale = min((SHEET_WIDTH - 2 * MARGIN - 1.7) / manipulator.length, 0.16)
     plan_height = scale * max(s.width for s in manipulator.segments) + 1.9
     side_height = (
-        scale * (max(s.chamber_top for s in manipulator.segments) - min(s.chamber_bottom for s in manipulator.segments))
-        + 1.7
+        scale * (max(s.chamber_top for s in manipulator.segments) - min(s.chamber_bottom for s in manipulator.segments)) + 1.7
     )
     panel_rows = -(-(2 * len(groups) + 2) // COLUMNS)
     height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
@@ -92,13 +91,9 @@ def drawing_figure(design):
         manipulator,
     )
     top -= plan_height
-    middle = (
-        max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)
-    ) / 2
+    middle = (max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)) / 2
     _side(
-        SheetView(
-            figure, (MARGIN, top - side_height, width, side_height), scale, manipulator.length / 2, middle, up=0.48
-        ),
+        SheetView(figure, (MARGIN, top - side_height, width, side_height), scale, manipulator.length / 2, middle, up=0.48),
         manipulator,
     )
     top -= side_height
@@ -118,9 +113,7 @@ def drawing_figure(design):
 def _frame(figure, design, height):
     from matplotlib.patches import Rectangle
 
-    figure.add_artist(
-        Rectangle((0.012, 0.2 / height), 0.976, 1 - 0.4 / height, fill=False, edgecolor=INK, linewidth=1.2)
-    )
+    figure.add_artist(Rectangle((0.012, 0.2 / height), 0.976, 1 - 0.4 / height, fill=False, edgecolor=INK, linewidth=1.2))
     manipulator = design.manipulator
     x, y = MARGIN / SHEET_WIDTH, 1 - (MARGIN + 0.1) / height
     figure.text(x, y, design.name, fontsize=17, weight="bold", color=INK, va="top")
@@ -132,9 +125,7 @@ def _frame(figure, design, height):
     figure.text(x, y - 0.33 / height, facts, fontsize=10, color=INK, va="top")
     figure.text(1 - x, y, "all dimensions in mm", fontsize=10, color=INK, va="top", ha="right")
     materials = {s.material.name: s.material for s in manipulator.segments}.values()
-    told = "; ".join(
-        f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials
-    )
+    told = "; ".join(f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials)
     notes = (
         f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The lower '
         "chambers of a twisting segment are the upper ones turned by half a turn about x. One cavity: the channel "
@@ -152,9 +143,7 @@ def _plan(view, manipulator):
     view.title(-view.mm(0.28), view.mm(0.3), "plan")
     for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
         half = s.width / 2
-        view.polygon(
-            [(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)], face="#f1f3f5"
-        )
+        view.polygon([(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)], face="#f1f3f5")
         for side in reversed(s.sides):
             for x in start + s.chamber_positions:
                 outline = chamber_plan(s, x, s.chamber_thickness, half, side)

@@ -137,9 +137,7 @@ def extract(target, pieces):
         within = (own > low + 1e-6 * ends[-1]) & (own < high - 1e-6 * ends[-1])
         stations = np.concatenate([[low], own[within], [high]])
         arcs.append(fit_arc(sample(target.points, stations), piece.kind, piece.curvature, piece.twist))
-    out = [
-        Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p)) for p, arc in zip(pieces, arcs)
-    ]
+    out = [Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p)) for p, arc in zip(pieces, arcs)]
     for run in _runs(pieces):
         for i in run:
             if target.frames is not None:
@@ -178,9 +176,7 @@ def _twist_of_run(target, pieces, arcs, run):
     if seen:
         shown = turn_about_axis(before, after)
         turn = (shown - given + np.pi) % (2 * np.pi) - np.pi
-        note = (
-            f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest is taken"
-        )
+        note = f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest is taken"
         if len(free) > 1:
             note += "; shared evenly among neighbours"
     free_length = sum(pieces[i].length for i in free)

@@ -17,6 +17,7 @@ from design.problem import EQ27, OBJECTIVES, PAIRED, PAIRS, Calls, Problem, Tria
 from design.space import Variable, grid, limits, prototype
 from design.targets import PRESSURE_LIMIT
 from geometry.parameters import Manipulator
+from reduced.clearance import gap_left
 
 LEAST_PRESSURE = 0.002  # MPa
 INSET = 0.05  # of a variable's range: starts keep off the bounds, where the interior method crawls
@@ -50,9 +51,7 @@ def solve(target, pieces, law, objective=PAIRED, say=print):
     prototypes = [prototype(target, piece) for piece in pieces]
     guesses = _guesses(target, pieces, prototypes, law)
     if not guesses:
-        raise ConvergenceError(
-            "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
-        )
+        raise ConvergenceError("the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker")
     say(f"lookup table: first guess at {1e3 * guesses[0].pressure:.1f} kPa, angles " + _angles(guesses[0].segments))
     run = _Run.start(target, pieces, law, guesses[0]).optimised(real_counts=True)
     if objective == EQ27:
@@ -134,9 +133,7 @@ class _Run:
         return replace(self, problem=replace(self.problem, objective=objective))
 
     def with_counts(self, counts):
-        variables = tuple(
-            replace(v, value=float(counts[v.segment])) if v.name == "chambers" else v for v in self.variables
-        )
+        variables = tuple(replace(v, value=float(counts[v.segment])) if v.name == "chambers" else v for v in self.variables)
         problem = replace(self.problem, counts=tuple(float(n) for n in counts))
         return replace(self, problem=problem, variables=variables, cost=np.inf)
 
@@ -149,9 +146,7 @@ class _Run:
         moment = points.T @ wanted
         turn = np.eye(3)
         if free == 1:
-            turn = se3.exp_rotation(
-                np.array([np.arctan2(moment[1, 2] - moment[2, 1], moment[1, 1] + moment[2, 2]), 0, 0])
-            )
+            turn = se3.exp_rotation(np.array([np.arctan2(moment[1, 2] - moment[2, 1], moment[1, 1] + moment[2, 2]), 0, 0]))
         elif free == 3:
             U, _, Vt = np.linalg.svd(moment)
             turn = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
@@ -183,9 +178,7 @@ class _Run:
         starts = [np.clip(self._x(variables), low + d, high - d) for d in (inset, 0 * inset)]
         start = next((x for x in starts if calls.attempt(x) is not None), None)
         if start is None:
-            raise ConvergenceError(
-                f"the law has no equilibrium at {1e3 * problem.pressure:.1f} kPa: lower the pressure"
-            )
+            raise ConvergenceError(f"the law has no equilibrium at {1e3 * problem.pressure:.1f} kPa: lower the pressure")
         options = {"x_scale": scale, "xtol": 1e-5, "ftol": 3e-3, "gtol": 1e-10, "max_nfev": 40}
         fit = least_squares(calls.residual, start, calls.jacobian, (low, high), **options)
         trial = Trial(problem, variables, fit.x)
@@ -198,9 +191,7 @@ class _Run:
             pressure=trial.pressure,
             rotation=trial.rotation,
         )
-        return replace(
-            self, problem=problem, variables=values, cost=2 * fit.cost, evaluations=self.evaluations + calls.count
-        )
+        return replace(self, problem=problem, variables=values, cost=2 * fit.cost, evaluations=self.evaluations + calls.count)
 
     @property
     def title(self):
@@ -220,7 +211,7 @@ class _Run:
         pressure = round(self.problem.pressure, 6)
         rounded = replace(self.problem, prototypes=tuple(segments), pressure=pressure)
         residual = rounded.residual(Trial(rounded, (), np.zeros(self.problem.turns.shape[1])))
-        active = tuple(v.text for v in self.variables if v.bound is not None)
+        active = tuple(v.text for v in self.variables if v.bound is not None) + tuple(about_to_touch(segments, pressure))
         pose = se3.make_pose(self.problem.rotation, self.problem.target.points[0])
         return Solution(
             Manipulator(tuple(segments)),
@@ -231,6 +222,14 @@ class _Run:
             self.grown,
             self.evaluations,
         )
+
+
+def about_to_touch(segments, pressure):
+    """Segments whose estimated clearance the design has used up, in words."""
+    for i, segment in enumerate(segments, start=1):
+        left = gap_left(segment, pressure)
+        if left < 0.02 * segment.gap:
+            yield f"segment {i} clearance of facing walls (estimate: {max(left, 0.0):.2f} mm left of {segment.gap:.2f} mm)"
 
 
 def _whole_chambers(run):

@@ -59,8 +59,7 @@ def first_guesses(pieces, prototypes, angles, heights, pressures, law):
     grid of each piece; pressures: increasing, MPa.
     """
     options = [
-        _options(piece, prototype, a, h, pressures, law)
-        for piece, prototype, a, h in zip(pieces, prototypes, angles, heights)
+        _options(piece, prototype, a, h, pressures, law) for piece, prototype, a, h in zip(pieces, prototypes, angles, heights)
     ]
     guesses = []
     for j, pressure in enumerate(pressures):

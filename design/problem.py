@@ -13,6 +13,7 @@ from base.errors import ConvergenceError, InputError
 from base.strains import RodStrains
 from design.curves import arc_lengths, evenly, nearest_points
 from design.lookup import active_length
+from reduced.clearance import gap_left
 from reduced.rod import centreline
 
 PAIRED, EQ27 = "paired", "eq27"
@@ -20,6 +21,7 @@ OBJECTIVES = (PAIRED, EQ27)
 PAIRS = 101
 SPACING = 2.0  # mm between the samples of a trial's centreline
 STEP = 1e-5  # of a variable's range, for differences
+TOUCH = 5.0  # mm of misfit per mm that facing walls would overlap: contact is not in the law, so it is not designed into
 PREFERENCE = 0.02  # mm of misfit per range that a dimension leaves its start by: decides where the target does not
 
 
@@ -78,7 +80,7 @@ class Problem:
             misfits = [(nearest_points(target.points, line.points) - target.points) / np.sqrt(len(target.points))]
         else:
             misfits = [self._paired(line)]
-        misfits.append(self._unseen_twists(trial))
+        misfits += [self._unseen_twists(trial), TOUCH * walls_overlap(trial.segments, trial.pressure)]
         return np.concatenate([m.ravel() for m in misfits])
 
     def _paired(self, line):
@@ -102,6 +104,11 @@ class Problem:
                 turned = self.law.strains(segment, trial.pressure).k[0] * active_length(segment, count)
                 misfits.append(segment.width / 2 * (turned - piece.twist * piece.length))
         return np.array(misfits)
+
+
+def walls_overlap(segments, pressure):
+    """By how much (mm) facing walls of each segment are expected to pass through each other; 0 where a gap stays."""
+    return np.array([max(0.0, -gap_left(s, pressure)) for s in segments])
 
 
 class Calls:

@@ -105,9 +105,7 @@ def _table(header, rows):
             out += f'<tr class="head"><td colspan="{len(header)}">{escape(row)}</td></tr>'
         else:
             out += (
-                "<tr>"
-                + "".join(f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row)
-                + "</tr>"
+                "<tr>" + "".join(f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row) + "</tr>"
             )
     return f'<div class="table"><table>{out}</table></div>'
 
@@ -258,9 +256,7 @@ def _walls(run, folder):
 
 def _drawing(run, folder):
     rows = segment_table(run.design.manipulator)
-    table = _table(
-        ["segment", *[str(i + 1) for i in range(len(rows[0][1]))]], [[label, *values] for label, values in rows]
-    )
+    table = _table(["segment", *[str(i + 1) for i in range(len(rows[0][1]))]], [[label, *values] for label, values in rows])
     materials = {s.material.name: s.material for s in run.design.manipulator.segments}.values()
     told = _table(
         ["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],

@@ -93,11 +93,7 @@ def body_pictures(run, comparison, model, folder):
             values = solved.point_data[field]
             top = np.percentile(values, 99.5)
             limits = (float(values.min()), float(max(top, values.min() + 1e-9)))
-            beyond = (
-                f"; 0.5 % of its nodes lie above the scale, up to {values.max():.2f}"
-                if values.max() > 1.01 * top
-                else ""
-            )
+            beyond = f"; 0.5 % of its nodes lie above the scale, up to {values.max():.2f}" if values.max() > 1.01 * top else ""
             if field == "stretch":
                 beyond += f"; the largest inside the elements is {run.solve.steps['largest_stretch'][-1]:.2f}"
             picture(
@@ -226,9 +222,7 @@ def wall_picture(run, folder):
                         ax.plot(x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False)
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
-        ax.set_title(
-            "upper chambers" if side > 0 else "lower chambers (seen through the body)", fontsize=9, loc="left", pad=7
-        )
+        ax.set_title("upper chambers" if side > 0 else "lower chambers (seen through the body)", fontsize=9, loc="left", pad=7)
         ax.set_yticks([])
         ax.tick_params(labelsize=8)
         for edge in ("left", "right", "top"):

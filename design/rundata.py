@@ -99,9 +99,7 @@ def _solve(directory):
     last = table[-1, 0]
     centrelines = read_columns(directory / "centrelines.csv", ["step", "s_mm", *POINTS])
     centreline = centrelines[centrelines[:, 0] == last]
-    strains = read_columns(
-        directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"]
-    )
+    strains = read_columns(directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"])
     strains = strains[strains[:, 0] == last]
     solution = directory / "solution.pvd"
     return Solve(

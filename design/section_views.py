@@ -54,9 +54,7 @@ def cross_section(figure, rectangle, scale, manipulator, group):
     view.axes_cross()
     top, low = s.chamber_top, s.chamber_bottom
     view.heading(_named(group, "through a chamber, along x"))
-    view.horizontal(
-        -s.cavity_width / 2, s.cavity_width / 2, s.cavity_top, top + view.mm(0.2), f"cavity {plain(s.cavity_width)}"
-    )
+    view.horizontal(-s.cavity_width / 2, s.cavity_width / 2, s.cavity_top, top + view.mm(0.2), f"cavity {plain(s.cavity_width)}")
     view.horizontal(s.cavity_width / 2, half, s.cavity_top, top + view.mm(0.2 + ROW), f"side wall {plain(s.side_wall)}")
     view.horizontal(
         -s.channel_width / 2,
@@ -107,6 +105,4 @@ def normal_section(figure, rectangle, scale, manipulator, group):
     if s.cavity_floor > 0:
         heights.insert(0, (0.0, s.cavity_floor, f"floor {plain(s.cavity_floor)}"))
     view.ladder(heights, stop, edge + view.mm(0.15))
-    view.vertical(
-        s.core_bottom, s.core_top, -margin, -margin - view.mm(0.25), f"core {plain(s.core_top - s.core_bottom)}"
-    )
+    view.vertical(s.core_bottom, s.core_top, -margin, -margin - view.mm(0.25), f"core {plain(s.core_top - s.core_bottom)}")

@@ -17,10 +17,7 @@ GRID = 18  # joints tried along the curve
 TOLERANCE = 0.001  # of the curve's length: a fit this good is good enough
 PRICE = 0.1  # of a rate, in units of a misfit of TOLERANCE over the whole curve
 RATES = {TWISTING: 1, BENDING: 2, HELICAL: 3}
-NOTE = (
-    "simple automatic split (no twist is sought where the curve is not straight): "
-    "give [[piece]] tables to split it yourself"
-)
+NOTE = "simple automatic split (no twist is sought where the curve is not straight): give [[piece]] tables to split it yourself"
 
 
 def split(points):

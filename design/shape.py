@@ -46,10 +46,7 @@ def run_shape(design_path, pressures, directory, say=print, model=None):
     say(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
     for p, line in shapes.items():
         tip = line.points[-1]
-        say(
-            f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, "
-            f"tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm"
-        )
+        say(f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm")
     try:
         _pictures(design, shapes, model, folder, say)
     except ImportError as error:
@@ -63,9 +60,7 @@ def run_shape(design_path, pressures, directory, say=print, model=None):
     )
     if failed:
         first = min(failed)
-        raise ConvergenceError(
-            f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa"
-        )
+        raise ConvergenceError(f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa")
     return folder
 
 
@@ -80,9 +75,7 @@ def _pictures(design, shapes, model, folder, say):
     for p, body in bodies.items():
         with atomic_path(folder / f"body_{plain(p * 1e3)}kPa.vtp") as temporary:
             body.save(temporary)
-    _picture_of_all(
-        design, view_of(np.vstack([body.points for body in bodies.values()])), bodies, folder / "bodies.png"
-    )
+    _picture_of_all(design, view_of(np.vstack([body.points for body in bodies.values()])), bodies, folder / "bodies.png")
     say(f"bodies at every pressure: {folder / 'bodies.png'}")
     highest = max(shapes)
     if highest > 0:

@@ -21,12 +21,13 @@ RANGES = {
         "angle": ((45, 135), (30, 150)),
         "chamber_height": ((3, 5), (2, 8)),
         "base_thickness": ((1.5, 3), (1, 5)),
+        "wall": ((1, 1.5), (0.8, 2)),
         "gap": ((1, 2), (1, 3)),  # half a gap of channel must fit into the end margin
     },
     TWISTING_KIND: {
         "angle": ((45, 135), (30, 150)),
-        "chamber_height": ((4, 6), (2, 6)),  # higher ones lean on each other as the segment twists
-        "gap": ((2, 3), (2, 3)),
+        "chamber_height": ((4, 6), (2, 8)),
+        "gap": ((2, 3), (1, 3)),
     },
 }
 UNITS = {"pressure": (" kPa", 1e3), "angle": (" deg", 1.0), "chambers": ("", 1.0)}

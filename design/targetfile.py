@@ -84,9 +84,7 @@ def _numbers(path, header, rows, skipped):
             raise InputError(f"{path} row {i + 1 + skipped}: {len(row)} columns instead of {len(header)}")
         for j, cell in enumerate(row):
             if not _is_number(cell) or not np.isfinite(float(cell)):
-                raise InputError(
-                    f"{path} row {i + 1 + skipped}: '{header[j]}' must be a finite number, not '{cell.strip()}'"
-                )
+                raise InputError(f"{path} row {i + 1 + skipped}: '{header[j]}' must be a finite number, not '{cell.strip()}'")
             table[i, j] = float(cell)
     return dict(zip(header, table.T))
 

@@ -96,9 +96,7 @@ def _checked_frames(frames, points):
     wrong = abs(np.swapaxes(frames, 1, 2) @ frames - np.eye(3)).max(axis=(1, 2)) > 1e-3
     wrong |= np.linalg.det(frames) < 0
     if wrong.any():
-        raise InputError(
-            f"frame {np.argmax(wrong) + 1} is not a right-handed set of orthogonal unit vectors t1, t2, t3"
-        )
+        raise InputError(f"frame {np.argmax(wrong) + 1} is not a right-handed set of orthogonal unit vectors t1, t2, t3")
     chords = np.diff(points, axis=0)
     if np.sum(chords * (frames[:-1, :, 0] + frames[1:, :, 0]) / 2) < 0.5 * np.linalg.norm(chords, axis=1).sum():
         raise InputError("frames: t1 does not point along the curve, from base to tip")

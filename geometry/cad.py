@@ -46,7 +46,12 @@ def slanted_plan(x, thickness, half_width, segment, side):
     half = thickness / segment.sin / 2
     slant = segment.cot * half_width * side
     return np.array(
-        [[x - slant - half, -half_width], [x - slant + half, -half_width], [x + slant + half, half_width], [x + slant - half, half_width]]
+        [
+            [x - slant - half, -half_width],
+            [x - slant + half, -half_width],
+            [x + slant + half, half_width],
+            [x + slant - half, half_width],
+        ]
     )
 
 

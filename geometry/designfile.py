@@ -33,7 +33,11 @@ class Design:
 def read_design(path):
     """The Design in a TOML file; InputError with file, table and key otherwise."""
     data = read_toml(path)
-    refuse_unknown(data, ["schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "segment", "base", "result"], str(path))
+    refuse_unknown(
+        data,
+        ["schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "segment", "base", "result"],
+        str(path),
+    )
     if data.get("schema", SCHEMA) != SCHEMA:
         raise InputError(f"{path}: schema = '{data['schema']}' is not '{SCHEMA}'")
     for key in ("pressure_kPa", "material", "segment"):
@@ -96,7 +100,12 @@ def design_tables(design):
         if s.material != first:
             row["material"] = material_to_table(s.material)
         rows.append(row)
-    tables = {"schema": SCHEMA, "name": design.name, "pressure_kPa": float(f"{design.pressure * 1e3:.12g}"), "mesh_size_mm": design.mesh_size}
+    tables = {
+        "schema": SCHEMA,
+        "name": design.name,
+        "pressure_kPa": float(f"{design.pressure * 1e3:.12g}"),
+        "mesh_size_mm": design.mesh_size,
+    }
     if design.target:
         tables["target"] = design.target
     tables["material"] = material_to_table(first)

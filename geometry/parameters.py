@@ -47,8 +47,20 @@ class Segment:
             raise InputError(f"angle_deg = {self.angle:g} is outside 30..150")
         if self.chambers < 1:
             raise InputError(f"chambers = {self.chambers}: a segment needs at least 1")
-        for name in ("width", "chamber_height", "cavity_thickness", "wall", "gap", "top_wall", "side_wall", "base_thickness",
-                     "roof", "channel_width", "channel_height", "end_margin"):
+        for name in (
+            "width",
+            "chamber_height",
+            "cavity_thickness",
+            "wall",
+            "gap",
+            "top_wall",
+            "side_wall",
+            "base_thickness",
+            "roof",
+            "channel_width",
+            "channel_height",
+            "end_margin",
+        ):
             value = getattr(self, name)
             if not value > 0:
                 raise InputError(f"{name}_mm = {value:g} must be larger than 0")
@@ -176,7 +188,10 @@ class Manipulator:
         if not self.segments:
             raise InputError("segment: at least one [[segment]] is needed")
         for i, (a, b) in enumerate(zip(self.segments, self.segments[1:]), start=1):
-            half_height, channel_width = max(a.channel_height, b.channel_height) / 2, max(a.channel_width, b.channel_width)
+            half_height, channel_width = (
+                max(a.channel_height, b.channel_height) / 2,
+                max(a.channel_width, b.channel_width),
+            )
             covered = max(a.core_bottom, b.core_bottom) < -half_height and half_height < min(a.core_top, b.core_top)
             if not covered or min(a.width, b.width) <= channel_width:
                 raise InputError(f"segment {i} and {i + 1}: the channel of one does not fit into the core of the other")

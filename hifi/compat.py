@@ -13,20 +13,20 @@ from dolfinx.io import gmshio
 from base.errors import InputError
 
 OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
-#: timeout in s, ten times as long as a form takes: another run may be compiling it into the same cache just now
-COMPILER = {"cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 200}
+#: timeout in s: another run may be compiling the same form into the same cache just now
+COMPILER = {"cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 60}
 VERSION = dolfinx.__version__
 
 
 @contextmanager
 def quiet_compiler():
-    """Compiling sends every gcc line to the root logger, which prints it to standard error if it has no handler."""
-    handler = logging.NullHandler()
-    logging.getLogger().addHandler(handler)
+    """Compiling logs every gcc line at level INFO, and ffcx has the root logger print that to standard error."""
+    before = logging.root.manager.disable
+    logging.disable(logging.INFO)
     try:
         yield
     finally:
-        logging.getLogger().removeHandler(handler)
+        logging.disable(before)
 
 
 @quiet_compiler()

@@ -53,9 +53,7 @@ class ManipulatorSolve:
         if flip_y:
             mesh.geometry.x[:, 1] *= -1
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
-        self.problem = MixedProblem(
-            mesh, cell_tags, facet_tags, materials, (cad.CAVITY, cad.CHANNEL), [Support(cad.BASE)]
-        )
+        self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, (cad.CAVITY, cad.CHANNEL), [Support(cad.BASE)])
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
         coordinates = RodCoordinates(self.problem.nodes, self.problem.owned_nodes, comm, spacing)
         self.newton = Newton(self.problem, coordinates, newton_options)
@@ -85,7 +83,10 @@ class ManipulatorSolve:
         """Step to `pressure` (MPa); `on_measured` sees every accepted state. ConvergenceError when it stops short."""
         softest = min(s.material.mu for s in self.manipulator.segments)
         size = StepSize(
-            first=min(first_step or 0.01 * softest, pressure), smallest=1e-5 * softest, largest=0.05 * softest, milestones=tuple(milestones)
+            first=min(first_step or 0.01 * softest, pressure),
+            smallest=1e-5 * softest,
+            largest=0.05 * softest,
+            milestones=tuple(milestones),
         )
         return run_steps(self.path, pressure, size, lambda step: on_measured(self.measure(step)))
 
@@ -153,7 +154,14 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
         last[:] = [m]
         if writer:
             writer.write(m.step, m.pressure * KPA)
-        history.append({"step": m.step, "pressure_kPa": m.pressure * KPA, "iterations": m.iterations, "factorisations": m.factorisations})
+        history.append(
+            {
+                "step": m.step,
+                "pressure_kPa": m.pressure * KPA,
+                "iterations": m.iterations,
+                "factorisations": m.factorisations,
+            }
+        )
         if comm.rank == 0:
             files.add(m)
             if m.step:
@@ -198,7 +206,12 @@ def versions():
     """Versions of what computed the result."""
     import petsc4py
 
-    return {"dolfinx": compat.VERSION, "petsc4py": petsc4py.__version__, "mpi": MPI.Get_library_version().split(",")[0], "numpy": np.__version__}
+    return {
+        "dolfinx": compat.VERSION,
+        "petsc4py": petsc4py.__version__,
+        "mpi": MPI.Get_library_version().split(",")[0],
+        "numpy": np.__version__,
+    }
 
 
 def _progress(m, target):

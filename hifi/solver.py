@@ -170,7 +170,9 @@ class Newton:
             history.append(norm)
             if not np.isfinite(norm) or norm > o.growth_limit * max(history[0], scale):
                 raise NotConverged(f"residual grew to {norm:.1e} N")
-        raise NotConverged(f"residual {norm:.1e} N after {o.maximum_iterations} iterations (tolerance {o.relative_tolerance * scale:.1e} N)")
+        raise NotConverged(
+            f"residual {norm:.1e} N after {o.maximum_iterations} iterations (tolerance {o.relative_tolerance * scale:.1e} N)"
+        )
 
     def destroy(self):
         self.solver.destroy()

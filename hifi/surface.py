@@ -53,9 +53,7 @@ def split(facets):
 
 # degree-4 rule on the triangle (Dunavant 1985): exact for P2 shape functions times linear coordinates
 _A4, _B4 = 0.445948490915965, 0.091576213509771
-_BARYCENTRIC = np.array(
-    [[1 - 2 * a if i == j else a for i in range(3)] for a in (_A4, _B4) for j in range(3)]
-)
+_BARYCENTRIC = np.array([[1 - 2 * a if i == j else a for i in range(3)] for a in (_A4, _B4) for j in range(3)])
 _WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 
 

@@ -69,7 +69,13 @@ def parser():
 
     c = add("shape", run_shape, "reduced model only: centrelines, 3D body, picture and animation")
     c.add_argument("design", type=Path)
-    c.add_argument("--pressure-kPa", type=pressures, dest="pressures", metavar="10,20,...", help="default: five steps to the design's")
+    c.add_argument(
+        "--pressure-kPa",
+        type=pressures,
+        dest="pressures",
+        metavar="10,20,...",
+        help="default: five steps to the design's",
+    )
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
 
     c = add("mesh", run_mesh, "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")

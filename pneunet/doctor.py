@@ -39,8 +39,7 @@ VERSIONS = {
     "PETSc": "from petsc4py import PETSc; print('.'.join(map(str, PETSc.Sys.getVersion())))",
     # the distribution's name changed between the releases
     "ufl": (
-        "import ufl; from importlib.metadata import packages_distributions as names, version\n"
-        "print(version(names()['ufl'][0]))"
+        "import ufl; from importlib.metadata import packages_distributions as names, version\nprint(version(names()['ufl'][0]))"
     ),
     "basix": "import basix; print(basix.__version__)",
     "ffcx": "import ffcx; print(ffcx.__version__)",
@@ -59,9 +58,7 @@ SCALAR = (
     "assert np.dtype(PETSc.ScalarType) == np.float64, f'{np.dtype(PETSc.ScalarType)}, must be float64'\n"
     "print('float64 (real)')"
 )
-MUMPS = (
-    "from petsc4py import PETSc\nassert PETSc.Sys.hasExternalPackage('mumps'), 'PETSc without MUMPS'\nprint('in PETSc')"
-)
+MUMPS = "from petsc4py import PETSc\nassert PETSc.Sys.hasExternalPackage('mumps'), 'PETSc without MUMPS'\nprint('in PETSc')"
 # The kernel's list of mapped files: the BLAS that is really loaded, all symbolic links resolved.
 BLAS = r"""
 from petsc4py import PETSc

@@ -38,9 +38,7 @@ def wall_shapes(x):
 
     Hermite cubics (displacement and slope at the foot, displacement and slope at the top) and the bulge 16 x^2 (1-x)^2.
     """
-    polynomials = np.array(
-        [[1, 0, -3, 2, 0], [0, 1, -2, 1, 0], [0, 0, 3, -2, 0], [0, 0, -1, 1, 0], [0, 0, 16, -32, 16]]
-    )
+    polynomials = np.array([[1, 0, -3, 2, 0], [0, 1, -2, 1, 0], [0, 0, 3, -2, 0], [0, 0, -1, 1, 0], [0, 0, 16, -32, 16]])
     powers = np.arange(5)
     value = x[None] ** powers[:, None]
     first = powers[:, None] * x[None] ** np.maximum(powers - 1, 0)[:, None]

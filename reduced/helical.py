@@ -111,15 +111,9 @@ class HelicalCell:
         shape, slope, _ = wall_shapes(x)
         z = self.cell.foot + H * x
         half = self.length / 2
-        slope_up = (
-            s.cavity_thickness / 2 / H * np.tensordot(slope, self.cell.wall_amplitudes(self.along[0]), axes=(0, 0))
-        )
-        slope_along = (
-            s.cavity_thickness / 2 / half * np.tensordot(shape, self.cell.wall_amplitudes(self.along[1]), axes=(0, 0))
-        )
-        arguments = np.broadcast_arrays(
-            self.cell.along_eta(z)[:, None], self.cell.section("height"), slope_along, slope_up
-        )
+        slope_up = s.cavity_thickness / 2 / H * np.tensordot(slope, self.cell.wall_amplitudes(self.along[0]), axes=(0, 0))
+        slope_along = s.cavity_thickness / 2 / half * np.tensordot(shape, self.cell.wall_amplitudes(self.along[1]), axes=(0, 0))
+        arguments = np.broadcast_arrays(self.cell.along_eta(z)[:, None], self.cell.section("height"), slope_along, slope_up)
         weights = np.outer(wx * H * 2 * s.wall * self.length, self.along_weights)
         return np.stack(arguments, axis=2).reshape(-1, 4, SIZE), weights.ravel()
 
@@ -176,9 +170,9 @@ class HelicalCell:
         # where the opening varies along the chamber the core is sheared: its displacement is a sawtooth across xi
         mean_square = (t * (1 - self.cell.share)) ** 2 / 12
         z, w = _gauss(s.core_bottom, s.core_top)
-        slope = self.cell.chamber("alpha", self.along[1]) + z[
-            :, None, None
-        ] / self.cell.core_height * self.cell.chamber("beta", self.along[1])
+        slope = self.cell.chamber("alpha", self.along[1]) + z[:, None, None] / self.cell.core_height * self.cell.chamber(
+            "beta", self.along[1]
+        )
         slope /= self.length / 2
         weight = np.outer(w * s.width * s.pitch * mean_square, self.along_weights)
         return hessian + 2 * np.einsum("ij,ijs,ijt->st", weight, slope, slope)

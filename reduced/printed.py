@@ -28,9 +28,7 @@ class PrintedResult:
 
     def __str__(self):
         state = ", ".join(f"{k} = {v:.4g}" for k, v in self.unknowns.items())
-        head = (
-            "solution" if self.solved else f"no solution in the physical range ({self.starts} starts); least residual"
-        )
+        head = "solution" if self.solved else f"no solution in the physical range ({self.starts} starts); least residual"
         return f"{head}: |residual| = {np.linalg.norm(self.residual):.3g} at {state}"
 
 

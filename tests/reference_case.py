@@ -18,7 +18,8 @@ def numbers():
 
     design = read_design(DATA / "reference.toml")
     # two decades below what is compared
-    solve = ManipulatorSolve(design.manipulator, DATA / "reference.msh", newton_options=NewtonOptions(relative_tolerance=1e-11))
+    options = NewtonOptions(relative_tolerance=1e-11)
+    solve = ManipulatorSolve(design.manipulator, DATA / "reference.msh", newton_options=options)
     solve.run(design.pressure)
     measured = solve.measure()
     out = {"volume_mm3": measured.volume, "largest_stretch": measured.largest_stretch}

@@ -28,9 +28,7 @@ def scaled_strains(manipulator, pressure, model):
     return tuple(RodStrains([s.e for s in group], [s.k for s in group]) for group in (pieces, each))
 
 
-def make_run(
-    directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, solve=True, fields=True
-):
+def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, solve=True, fields=True):
     """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap` mm."""
     manipulator, model = Manipulator(segments), AnalyticModel()
     design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")

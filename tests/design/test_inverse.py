@@ -138,9 +138,7 @@ def test_a_law_that_ends_at_a_limit_load_is_kept_within():
 def test_what_cannot_be_built_is_said():
     line, pieces = made((BENDING, HELICAL))
     with pytest.raises(InputError, match=r"\[\[piece\]\] 1: length_mm = 4 is too short"):
-        designed(
-            Target(line.points, pieces=(Piece("bending", 4.0), Piece("helical", sum(p.length for p in pieces) - 4)))
-        )
+        designed(Target(line.points, pieces=(Piece("bending", 4.0), Piece("helical", sum(p.length for p in pieces) - 4))))
     with pytest.raises(InputError, match=r"\[segment\].*side_wall_mm"):
         designed(Target(line.points, pieces=pieces, start={"side_wall": 6.0}))
     with pytest.raises(InputError, match=r"\[vary\].*angle_deg = 10"):

@@ -89,9 +89,9 @@ def test_view_holds_all_points_and_is_orthonormal():
     points = np.random.default_rng(1).normal(size=(50, 3)) * [80, 20, 10]
     view = view_of(points)
     towards = np.cross(view.right, view.up)
-    assert np.column_stack([view.right, view.up, towards]).T @ np.column_stack(
-        [view.right, view.up, towards]
-    ) == pytest.approx(np.eye(3))
+    assert np.column_stack([view.right, view.up, towards]).T @ np.column_stack([view.right, view.up, towards]) == pytest.approx(
+        np.eye(3)
+    )
     assert np.abs((points - view.focus) @ view.up).max() < view.half_height
     assert np.abs((points - view.focus) @ view.right).max() < view.half_height * PIXELS[0] / PIXELS[1]
 
@@ -101,9 +101,7 @@ def test_rendered_scale_is_the_views_scale():
     from design.bodies import render, view_of
 
     view = view_of(np.array([[-30.0, 0, 0], [30, 0, 0], [0, 20, 20]]))
-    image = render(
-        view, [(pyvista.Sphere(radius=10.0, center=view.focus), {"color": "black", "ambient": 1.0, "diffuse": 0.0})]
-    )
+    image = render(view, [(pyvista.Sphere(radius=10.0, center=view.focus), {"color": "black", "ambient": 1.0, "diffuse": 0.0})])
     rows = np.flatnonzero((image < 128).all(axis=2).any(axis=1))
     assert np.ptp(rows) * view.millimetres_per_pixel == pytest.approx(20.0, rel=0.02)
 

@@ -99,9 +99,7 @@ def test_nothing_is_left_of_a_mesh_that_fails(tmp_path, monkeypatch):
 def test_quality_and_volume_of_tetrahedra():
     regular = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
     corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
-    volumes, quality = mesh.tet_volumes_and_quality(
-        np.stack([regular, corner, corner[[1, 0, 2, 3]], corner * [1, 1, 0]])
-    )
+    volumes, quality = mesh.tet_volumes_and_quality(np.stack([regular, corner, corner[[1, 0, 2, 3]], corner * [1, 1, 0]]))
     assert abs(volumes) == pytest.approx([8 / 3, 1 / 6, 1 / 6, 0]) and volumes[1] == -volumes[2] > 0
     assert abs(quality[0]) == pytest.approx(1.0) and quality[3] == 0.0 and quality[2] == -quality[1] < 0
 

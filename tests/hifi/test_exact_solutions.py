@@ -21,7 +21,8 @@ def follow(problem, loads, observe, pressure=lambda load: load, first=0.05):
     newton = Newton(problem, RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm))
     path = LoadPath(newton, pressure)
     seen = {}
-    run_steps(path, loads[-1], StepSize(first, 1e-4, milestones=tuple(loads)), lambda step: seen.update({step.load: observe()}))
+    size = StepSize(first, 1e-4, milestones=tuple(loads))
+    run_steps(path, loads[-1], size, lambda step: seen.update({step.load: observe()}))
     newton.destroy()
     return [seen[load] for load in loads]
 

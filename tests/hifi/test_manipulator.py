@@ -134,7 +134,8 @@ def test_work_of_the_pressure_is_stored(reference):
 
 
 def test_pressure_out_of_reach_keeps_what_converged(shared_directory):
-    soft = Manipulator((Segment("one-sided", 90.0, 1, wall=0.5, top_wall=0.5, side_wall=0.5, chamber_height=8.0),))
+    thin = {"wall": 0.5, "top_wall": 0.5, "side_wall": 0.5}
+    soft = Manipulator((Segment("one-sided", 90.0, 1, chamber_height=8.0, **thin),))
     solve = ManipulatorSolve(soft, meshed(soft, shared_directory))
     reached = []
     with pytest.raises(ConvergenceError, match="stopped at load"):
@@ -146,7 +147,19 @@ def test_pressure_out_of_reach_keeps_what_converged(shared_directory):
 @pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts its own two ranks")
 def test_two_ranks_agree_with_one(tmp_path):
     out = tmp_path / "two.json"
-    command = [sys.executable, "-m", "pneunet", "run", "-n", "2", "--", sys.executable, "-m", "tests.reference_case", str(out)]
+    command = [
+        sys.executable,
+        "-m",
+        "pneunet",
+        "run",
+        "-n",
+        "2",
+        "--",
+        sys.executable,
+        "-m",
+        "tests.reference_case",
+        str(out),
+    ]
     subprocess.run(command, check=True, cwd=ROOT, timeout=300)
     two, one = json.loads(out.read_text()), reference_case.numbers()
     assert set(one) == set(two)

@@ -18,7 +18,8 @@ def largest(values):
 def beam():
     """Nodes of a 60 x 8 x 6 mm block, split over the ranks by x, and its rod coordinates."""
     comm = MPI.COMM_WORLD
-    grid = np.stack(np.meshgrid(np.linspace(0, 60, 61), np.linspace(-4, 4, 5), np.linspace(-3, 3, 4), indexing="ij"), axis=-1)
+    axes = np.linspace(0, 60, 61), np.linspace(-4, 4, 5), np.linspace(-3, 3, 4)
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     nodes = np.array_split(grid.reshape(-1, 3), comm.size)[comm.rank]
     return nodes, RodCoordinates(nodes, len(nodes), comm, spacing=6.0)
 

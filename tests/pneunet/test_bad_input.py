@@ -208,18 +208,14 @@ def test_as_typed_and_on_two_ranks(folder):
 def test_a_folder_that_cannot_be_written_to_is_refused(folder, capsys):
     error = refused(capsys, folder, "shape", "good.toml", "-o", folder / "good.toml" / "deeper")
     assert "good.toml/deeper" in error and "choose another folder with -o" in error
-    done = subprocess.run(
-        [PNEUNET, "solve", "good.toml", "-o", "curve.csv"], capture_output=True, text=True, timeout=120
-    )
+    done = subprocess.run([PNEUNET, "solve", "good.toml", "-o", "curve.csv"], capture_output=True, text=True, timeout=120)
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
     assert "curve.csv/solve: cannot be written to" in done.stderr and "-o" in done.stderr
 
 
 def test_pressure_beyond_what_converges_keeps_what_did(folder):
     """A soft chamber balloons far below the pressure asked for."""
-    (folder / "soft.toml").write_text(
-        changed(DESIGN, "mu_MPa = 0.3", "mu_MPa = 0.05").replace("chambers = 2", "chambers = 1")
-    )
+    (folder / "soft.toml").write_text(changed(DESIGN, "mu_MPa = 0.3", "mu_MPa = 0.05").replace("chambers = 2", "chambers = 1"))
     arguments = ["solve", "soft.toml", "--mesh-size-mm", "8", "--pressure-kPa", "200", "-o", "out"]
     done = subprocess.run([PNEUNET, *arguments], capture_output=True, text=True, timeout=300)
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
