@@ -82,3 +82,12 @@ def output_directory(path):
     except OSError as error:
         raise InputError(f"{path}: cannot be written to ({error.strerror}): choose another folder with -o") from None
     return path
+
+
+def require_writable(path):
+    """InputError when `path` could not be made or written to; makes nothing itself, for use before long work."""
+    existing = Path(path).absolute()
+    while not existing.exists():
+        existing = existing.parent
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        raise InputError(f"{path}: cannot be written to: choose another folder with -o")

@@ -28,9 +28,7 @@ class NeoHookean:
 
 #: The paper's two calibrations (physics: mu = 0.317 for its twisting theory; E = 0.619, nu = 0.49 for its helical one).
 PAPER_TWISTING = NeoHookean(mu=0.317, name="paper, twisting theory", source="Jiang et al. 2021, Eq. 2")
-PAPER_HELICAL = NeoHookean(
-    mu=0.619 / (2 * 1.49), name="paper, helical theory", source="Jiang et al. 2021, Sec. IV, E=0.619, nu=0.49"
-)
+PAPER_HELICAL = NeoHookean(mu=0.619 / (2 * 1.49), name="paper, helical theory", source="Jiang et al. 2021, Sec. IV, E=0.619, nu=0.49")
 
 LAWS = {NeoHookean.law: NeoHookean}
 

@@ -77,9 +77,7 @@ def from_table(cls, table, where, **preset):
     for key, field in fields.items():
         if key not in table:
             if field.default is dataclasses.MISSING:
-                raise InputError(
-                    f"{where}: key '{key}' is missing" + (f" ({field.metadata['note']})" if field.metadata["note"] else "")
-                )
+                raise InputError(f"{where}: key '{key}' is missing" + (f" ({field.metadata['note']})" if field.metadata["note"] else ""))
             continue
         value = table[key]
         if field.type in (float, "float"):

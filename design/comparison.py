@@ -107,11 +107,7 @@ def verdict(run, comparison):
         promise = f"the reduced model predicts to follow the target within {_mm(c.reduced_target)}"
     if c.solved is None:
         told = promise or "there is neither a target nor a finite element solution to judge the prediction by"
-        return (
-            f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet."
-            if promise
-            else f"{told[0].upper()}{told[1:]}."
-        )
+        return f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet." if promise else f"{told[0].upper()}{told[1:]}."
     pressure = f"{plain(run.solve.pressure * 1e3)} kPa"
     if c.reduced_solved is None:
         sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"

@@ -76,9 +76,7 @@ def drawing_figure(design):
     rows = segment_table(manipulator)
     scale = min((SHEET_WIDTH - 2 * MARGIN - 1.7) / manipulator.length, 0.16)
     plan_height = scale * max(s.width for s in manipulator.segments) + 1.9
-    side_height = (
-        scale * (max(s.chamber_top for s in manipulator.segments) - min(s.chamber_bottom for s in manipulator.segments)) + 1.7
-    )
+    side_height = scale * (max(s.chamber_top for s in manipulator.segments) - min(s.chamber_bottom for s in manipulator.segments)) + 1.7
     panel_rows = -(-(2 * len(groups) + 2) // COLUMNS)
     height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
     figure = Figure(figsize=(SHEET_WIDTH, height), facecolor="white")

@@ -58,9 +58,7 @@ def first_guesses(pieces, prototypes, angles, heights, pressures, law):
     pieces: `Extracted`; prototypes: a Segment for each with its start dimensions; angles (deg) and heights (mm): the
     grid of each piece; pressures: increasing, MPa.
     """
-    options = [
-        _options(piece, prototype, a, h, pressures, law) for piece, prototype, a, h in zip(pieces, prototypes, angles, heights)
-    ]
+    options = [_options(piece, prototype, a, h, pressures, law) for piece, prototype, a, h in zip(pieces, prototypes, angles, heights)]
     guesses = []
     for j, pressure in enumerate(pressures):
         best = [min(entries[j], key=lambda entry: entry[0], default=None) for entries in options]

@@ -51,9 +51,7 @@ def curve_panels(figure, curves, segments=None, bottom=0.06):
     curves : [(label, points (n, 3) in mm, style of STYLES)]. segments : [(colour, points)], bands under the curves.
     """
     everything = np.vstack([points for _, points, _ in curves])
-    grid = figure.add_gridspec(
-        2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32
-    )
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32)
     ax = figure.add_subplot(grid[:, 0], projection="3d")
     ax.view_init(*camera_angles(everything))
     band = {"linewidth": 9, "alpha": 0.75, "solid_capstyle": "butt", "zorder": 1}

@@ -69,9 +69,7 @@ def write_report(directory, say=print, model=None):
         ("Drawing, dimensions, material", _drawing(run, folder)),
         ("How it was computed", _computed(run)),
     ]
-    body = _headline(run, comparison) + "".join(
-        f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections
-    )
+    body = _headline(run, comparison) + "".join(f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections)
     page = (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -104,9 +102,7 @@ def _table(header, rows):
         if isinstance(row, str):
             out += f'<tr class="head"><td colspan="{len(header)}">{escape(row)}</td></tr>'
         else:
-            out += (
-                "<tr>" + "".join(f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row) + "</tr>"
-            )
+            out += "<tr>" + "".join(f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row) + "</tr>"
     return f'<div class="table"><table>{out}</table></div>'
 
 
@@ -177,8 +173,7 @@ def _errors(comparison, run):
         ["RMS, points paired by arc length"] + [both(e, e.rms) for _, e in columns],
         ["two-sided Hausdorff distance"] + [both(e, e.hausdorff) for _, e in columns],
         ["tip distance"] + [both(e, e.tip) for _, e in columns],
-        ["Eq. 27 (sum of squared nearest distances)"]
-        + [f"{significant(e.eq27)} mm² over {e.eq27_points} points" for _, e in columns],
+        ["Eq. 27 (sum of squared nearest distances)"] + [f"{significant(e.eq27)} mm² over {e.eq27_points} points" for _, e in columns],
         ["length mismatch"] + [both(e, e.length_mismatch, "+") for _, e in columns],
         ["lengths"] + [f"{e.length:.2f} mm vs {e.reference_length:.2f} mm" for _, e in columns],
     ]

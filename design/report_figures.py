@@ -104,9 +104,7 @@ def body_pictures(run, comparison, model, folder):
                 (label, limits, cmap),
             )
     rest_view = bodies.view_of(rest.points)
-    bodies.write_picture(
-        folder / "reference.png", rest_view, bodies.render(rest_view, bodies.painted(rest)), "reference body, 0 kPa"
-    )
+    bodies.write_picture(folder / "reference.png", rest_view, bodies.render(rest_view, bodies.painted(rest)), "reference body, 0 kPa")
     out.append(("reference.png", "The body at rest (its own scale)."))
     return out
 

@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 
 from base.errors import InputError
-from base.files import output_directory, write_csv
+from base.files import output_directory, require_writable, write_csv
 from base.record import write_record
 from design.extraction import extract
 from design.inverse import solve
@@ -35,6 +35,7 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
         raise InputError(f"objective = '{objective}' is not known: write {' or '.join(OBJECTIVES)}")
     law = AnalyticModel() if law is None else law
     target = read_target(target_path)
+    require_writable(directory)
     pieces, note = (target.pieces, GIVEN_NOTE) if target.pieces else (split(target.points), NOTE)
     say(f"target {target.name}: {len(target.points)} points, {target.length:.2f} mm; {note}")
     wanted = extract(target, pieces)

@@ -64,9 +64,7 @@ def _refined(points, kinds, ends, step, shortest, length):
     """Joints moved by halves of the grid's step, down to 1/16, while that lowers the misfit of the two pieces."""
 
     def misfit(i):
-        return _misfit(points, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(
-            points, ends[i], ends[i + 1], kinds[i], length
-        )
+        return _misfit(points, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(points, ends[i], ends[i + 1], kinds[i], length)
 
     ends = list(ends)
     for move in (step / 2, step / 4, step / 8, step / 16):

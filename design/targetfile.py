@@ -182,9 +182,7 @@ def _pressure_range(table, where):
     else:
         return None
     if not 0 < low <= high <= 1e3 * PRESSURE_LIMIT:
-        raise InputError(
-            f"{where}: {key} = {table[key]} must lie in 0..{1e3 * PRESSURE_LIMIT:g} kPa (above it the chambers leak)"
-        )
+        raise InputError(f"{where}: {key} = {table[key]} must lie in 0..{1e3 * PRESSURE_LIMIT:g} kPa (above it the chambers leak)")
     return low * MPA_PER_KPA, high * MPA_PER_KPA
 
 
@@ -241,9 +239,7 @@ def _helix(value, curvature, where):
         return helix_frenet(value[cylinder[0]] * PER_MM_PER_M, value["pitch_mm"])
     if set(given) == set(frenet):
         return curvature, value["torsion_rad_per_m"] * PER_MM_PER_M
-    raise InputError(
-        f"{where}: a helix is given by {' and '.join(cylinder)}, or by {' and '.join(frenet)} (Frenet), or not at all"
-    )
+    raise InputError(f"{where}: a helix is given by {' and '.join(cylinder)}, or by {' and '.join(frenet)} (Frenet), or not at all")
 
 
 def _base(table, where):

@@ -108,7 +108,6 @@ def _fitted_to(pieces, length):
     total = sum(p.length for p in pieces)
     if abs(total - length) > LENGTH_TOLERANCE * length:
         raise InputError(
-            f"[[piece]] length_mm: the pieces add up to {total:.4g} mm but the curve is {length:.4g} mm long "
-            "(lengths are deformed ones)"
+            f"[[piece]] length_mm: the pieces add up to {total:.4g} mm but the curve is {length:.4g} mm long (lengths are deformed ones)"
         )
     return tuple(Piece(p.kind, p.length * length / total, p.twist, p.curvature) for p in pieces)

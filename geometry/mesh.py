@@ -29,9 +29,7 @@ def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
     with cad.session():
         try:
             volumes = cad.build(manipulator)
-            say(
-                f"CAD: body {volumes['body_mm3']:.1f} mm3, cavity {volumes['cavity_mm3']:.1f} mm3 ({time.perf_counter() - started:.1f} s)"
-            )
+            say(f"CAD: body {volumes['body_mm3']:.1f} mm3, cavity {volumes['cavity_mm3']:.1f} mm3 ({time.perf_counter() - started:.1f} s)")
             with atomic_path(directory / "manipulator.step") as temporary, _quiet():
                 gmsh.write(str(temporary))
             gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
@@ -52,9 +50,7 @@ def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
             gmsh.write(str(temporary))
     facts["seconds"] = time.perf_counter() - started
     write_text(directory / "mesh.json", json.dumps(facts, indent=1) + "\n")
-    say(
-        f"mesh: {facts['cells']} cells, {facts['vertices']} vertices, cavity closed, smallest quality {facts['smallest_quality']:.2f}"
-    )
+    say(f"mesh: {facts['cells']} cells, {facts['vertices']} vertices, cavity closed, smallest quality {facts['smallest_quality']:.2f}")
     return facts
 
 
@@ -120,9 +116,7 @@ def _check(volumes):
     cell_volumes, quality = tet_volumes_and_quality(positions[tets])
     mesh_volume = float(cell_volumes.sum())
     if abs(mesh_volume - volumes["body_mm3"]) > 1e-6 * volumes["body_mm3"]:
-        raise InputError(
-            f"mesh: its volume {mesh_volume:.3f} mm3 is not the CAD's {volumes['body_mm3']:.3f} mm3: solids intersect"
-        )
+        raise InputError(f"mesh: its volume {mesh_volume:.3f} mm3 is not the CAD's {volumes['body_mm3']:.3f} mm3: solids intersect")
     if quality.min() <= 0:
         raise InputError("mesh: a tetrahedron is inverted; try another mesh_size_mm")
     return {

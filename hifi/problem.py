@@ -56,9 +56,7 @@ class MixedProblem:
         self.bcs = [self._support_condition(support) for support in self.supports]
         #: supported dofs of the mixed vector: those this rank sees, and those it owns
         self.fixed_dofs = np.unique(np.concatenate([bc.dof_indices()[0] for bc in self.bcs] + [np.zeros(0, np.int32)]))
-        self._fixed_owned = self.fixed_dofs[
-            self.fixed_dofs < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs
-        ]
+        self._fixed_owned = self.fixed_dofs[self.fixed_dofs < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
         self.pressure = fem.Constant(mesh, PETSc.ScalarType(0.0))
 
         u, p = ufl.split(self.state)

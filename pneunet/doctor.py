@@ -38,9 +38,7 @@ VERSIONS = {
     "petsc4py": "import petsc4py; print(petsc4py.__version__)",
     "PETSc": "from petsc4py import PETSc; print('.'.join(map(str, PETSc.Sys.getVersion())))",
     # the distribution's name changed between the releases
-    "ufl": (
-        "import ufl; from importlib.metadata import packages_distributions as names, version\nprint(version(names()['ufl'][0]))"
-    ),
+    "ufl": ("import ufl; from importlib.metadata import packages_distributions as names, version\nprint(version(names()['ufl'][0]))"),
     "basix": "import basix; print(basix.__version__)",
     "ffcx": "import ffcx; print(ffcx.__version__)",
     "dolfinx": "import dolfinx; print(dolfinx.__version__)",
@@ -93,9 +91,7 @@ def probe(code: str, **env: str) -> tuple[bool, str]:
     """Run Python code apart; (True, what it printed) or (False, the last line of what went wrong)."""
     command = [sys.executable, "-c", code]
     try:
-        done = subprocess.run(
-            command, env={**os.environ, **env}, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120
-        )
+        done = subprocess.run(command, env={**os.environ, **env}, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120)
     except subprocess.TimeoutExpired:
         return False, "no answer within 120 s"
     if done.returncode == 0:

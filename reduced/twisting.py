@@ -42,9 +42,7 @@ class TwistingTube:
 
     def __post_init__(self):
         if not 0 < self.inner_radius < self.outer_radius:
-            raise InputError(
-                f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius = {self.outer_radius:g} mm"
-            )
+            raise InputError(f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius = {self.outer_radius:g} mm")
         for name in ("mu", "fibre_modulus", "isotropic_fraction", "anisotropic_fraction"):
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} = {getattr(self, name):g} must be larger than 0")

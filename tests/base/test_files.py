@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from base.errors import InputError
-from base.files import atomic_path, output_directory, read_columns, read_csv, write_csv, write_text
+from base.files import atomic_path, output_directory, read_columns, read_csv, require_writable, write_csv, write_text
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -63,3 +63,11 @@ def test_a_folder_that_cannot_be_made_is_bad_input(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written to .*-o"):
         output_directory(tmp_path / "file" / "folder")
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_long_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    require_writable(tmp_path / "not" / "yet")
+    assert not (tmp_path / "not").exists()
+    with pytest.raises(InputError, match="choose another folder"):
+        require_writable(tmp_path / "file" / "below")

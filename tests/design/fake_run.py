@@ -42,9 +42,7 @@ def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1
     if not solve:
         return design
     (directory / "mesh").mkdir(exist_ok=True)
-    (directory / "mesh" / "mesh.json").write_text(
-        json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}})
-    )
+    (directory / "mesh" / "mesh.json").write_text(json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}}))
     _solve(directory / "solve", design, model, reached, overlap, fields)
     return design
 
@@ -116,9 +114,7 @@ def _fields(folder, manipulator, line):
 
     s0 = manipulator.segments[0]
     x = np.linspace(0, manipulator.length, 60)
-    grid = pyvista.RectilinearGrid(
-        x, np.linspace(-s0.width / 2, s0.width / 2, 5), np.linspace(-2, 4, 4)
-    ).cast_to_unstructured_grid()
+    grid = pyvista.RectilinearGrid(x, np.linspace(-s0.width / 2, s0.width / 2, 5), np.linspace(-2, 4, 4)).cast_to_unstructured_grid()
     rest = np.asarray(grid.points, float)
     poses = line.at(np.clip(rest[:, 0], 0, line.s[-1]))
     local = rest * [0, 1, 1]

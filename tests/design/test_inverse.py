@@ -65,11 +65,7 @@ def test_a_fixed_direction_leaves_the_roll_free():
     pose = se3.exp_pose(np.array([1.0, 0, 0, 0, 0, 0]))
     line, pieces = made((BENDING, HELICAL), pose=pose)
     solution, errors, _ = designed(Target(line.points, pieces=pieces, base_direction=BASE["base_direction"]))
-    assert (
-        errors.rms < 0.1
-        and np.allclose(solution.base_pose[:3, 0], [1, 0, 0])
-        and np.allclose(solution.base_pose, pose, atol=0.05)
-    )
+    assert errors.rms < 0.1 and np.allclose(solution.base_pose[:3, 0], [1, 0, 0]) and np.allclose(solution.base_pose, pose, atol=0.05)
 
 
 def test_mirrored_target_gives_the_mirrored_design():

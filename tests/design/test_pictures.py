@@ -89,9 +89,7 @@ def test_view_holds_all_points_and_is_orthonormal():
     points = np.random.default_rng(1).normal(size=(50, 3)) * [80, 20, 10]
     view = view_of(points)
     towards = np.cross(view.right, view.up)
-    assert np.column_stack([view.right, view.up, towards]).T @ np.column_stack([view.right, view.up, towards]) == pytest.approx(
-        np.eye(3)
-    )
+    assert np.column_stack([view.right, view.up, towards]).T @ np.column_stack([view.right, view.up, towards]) == pytest.approx(np.eye(3))
     assert np.abs((points - view.focus) @ view.up).max() < view.half_height
     assert np.abs((points - view.focus) @ view.right).max() < view.half_height * PIXELS[0] / PIXELS[1]
 

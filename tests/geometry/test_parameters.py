@@ -43,8 +43,7 @@ def test_segments_that_cannot_be_built_are_refused(change, message):
 
 @pytest.mark.parametrize(
     "name",
-    "chamber_height cavity_thickness wall gap top_wall side_wall base_thickness roof channel_width channel_height "
-    "end_margin width".split(),
+    "chamber_height cavity_thickness wall gap top_wall side_wall base_thickness roof channel_width channel_height end_margin width".split(),
 )
 def test_every_dimension_must_be_positive(name):
     with pytest.raises(InputError, match=f"^{name}_mm = -0.5 must be larger than 0$"):
