@@ -228,7 +228,9 @@ def _progress(m, target):
 def _prepare(design, directory, mesh_size, say):
     from geometry.mesh import mesh_manipulator, segment_tables
 
-    output_directory(directory / "solve")
+    out = output_directory(directory / "solve")
+    for old in [*out.glob("step_*.vtu"), out / "solution.pvd", out / "run.json"]:
+        old.unlink(missing_ok=True)  # of an earlier run, which may have had more steps
     facts_path = directory / "mesh" / "mesh.json"
     if facts_path.exists() and (directory / "mesh" / "manipulator.msh").exists():
         facts = json.loads(facts_path.read_text())
