@@ -50,8 +50,25 @@ def merge(path, entries):
     write_text(path, json.dumps(known | entries, indent=1, sort_keys=True) + "\n")
 
 
+def demo_picture():
+    """The README's picture: three of the demo report's side by side, at most 256 colours to stay small."""
+    from PIL import Image
+
+    parts = [Image.open(ROOT / "out" / "demo" / "report" / f"{name}.png").convert("RGB") for name in ("target", "reduced", "fe")]
+    height = min(part.height for part in parts)
+    parts = [part.resize((round(part.width * height / part.height), height)) for part in parts]
+    row = Image.new("RGB", (sum(part.width for part in parts), height), "white")
+    x = 0
+    for part in parts:
+        row.paste(part, (x, 0))
+        x += part.width
+    row.thumbnail((1500, 1500))
+    row.quantize(256).save(ROOT / "docs" / "demo.png", optimize=True)
+
+
 def snapshot():
-    """Copy the results to docs/ and write the table of figures."""
+    """Copy the results to docs/, write the table of figures and the README's picture."""
+    demo_picture()
     for name in ("results.json", "results.meta.json"):
         shutil.copyfile(OUT / name, ROOT / "docs" / name)
     results = json.loads((OUT / "results.json").read_text())
