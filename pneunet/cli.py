@@ -7,6 +7,7 @@ rank); anything else is a bug and shows its traceback.
 import argparse
 import os
 import sys
+import time
 from pathlib import Path
 
 from base.errors import ConvergenceError, InputError
@@ -173,9 +174,12 @@ def main(arguments=None):
         a = parser().parse_args(arguments)
         return a.function(a) or 0
     except (InputError, ConvergenceError) as error:
-        # every rank fails alike; one of them says so
+        # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with it
+        # what rank 0 still has to say, at the first failure
         if all(os.environ.get(name, "0") == "0" for name in MPI_RANK_VARIABLES):
-            print(f"pneunet: {error}", file=sys.stderr)
+            print(f"pneunet: {error}", file=sys.stderr, flush=True)
+        else:
+            time.sleep(1.0)
         return 2
     except KeyboardInterrupt:
         return 130
