@@ -28,10 +28,10 @@ MEANING = {
     "setup_seconds": "fresh Debian 13 root to a working `.venv`: apt and PyPI downloads included, wall s",
     "demo_seconds": "`make demo` after set-up, 2 ranks, wall s",
     "test_seconds": "`make test` after set-up with a cold form cache, wall s",
-    "demo_reduced_vs_fe_rms_percent_of_length": "demo: reduced against FE centreline at FE's last pressure, RMS of points paired by arc length, % of length",
+    "demo_reduced_vs_fe_rms_percent_of_length": "demo: reduced against FE at FE's last pressure, RMS paired by arc length, % of length",
     "demo_fe_vs_target_rms_percent_of_length": "demo: FE centreline against the target, RMS paired by arc length, % of length",
     "demo_pressure_reached_kPa": "demo: pressure the FE solution reached, kPa",
-    "rank_agreement_rel": "reference case on 1 and 2 ranks: largest difference of a result, relative to the larger of itself and 1 (0.01 for 1/mm)",
+    "rank_agreement_rel": "reference case, 1 against 2 ranks: largest difference relative to the larger of a result and 1 (0.01 for 1/mm)",
 }
 
 
@@ -78,9 +78,8 @@ def snapshot():
     lines += [f"| `{key}` | {value:.4g} | {MEANING[key]} |" for key, value in sorted(results.items())]
     lines += ["", "| part | date | revision | machine | calibration loop, s |", "|---|---|---|---|---|"]
     for part, m in sorted(meta.items()):
-        lines.append(
-            f"| {part} | {m['date']} | {m['revision']} | {m['machine']['processor']}, {m['machine']['cores']} cores | {m['calibration_seconds']:.3f} |"
-        )
+        where = f"{m['machine']['processor']}, {m['machine']['cores']} cores"
+        lines.append(f"| {part} | {m['date']} | {m['revision']} | {where} | {m['calibration_seconds']:.3f} |")
     write_text(ROOT / "docs" / "figures.md", "\n".join(lines) + "\n")
 
 

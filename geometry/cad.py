@@ -55,16 +55,16 @@ def slanted_plan(x, thickness, half_width, segment, side):
     )
 
 
-def _box(x0, x1, half_width, z0, z1):
+def box(x0, x1, half_width, z0, z1):
     return gmsh.model.occ.addBox(x0, -half_width, z0, x1 - x0, 2 * half_width, z1 - z0)
 
 
-def _chamber(segment, x, side, thickness, half_width, z0, z1):
+def chamber_block(segment, x, side, thickness, half_width, z0, z1):
     low, high = sorted((side * z0, side * z1))
     return prism(slanted_plan(x, thickness, half_width, segment, side), low, high)
 
 
-def _fuse(tags, unify):
+def fuse(tags, unify):
     gmsh.option.setNumber("Geometry.OCCUnionUnify", int(unify))
     if len(tags) == 1:
         return [(3, tags[0])]
@@ -74,11 +74,11 @@ def _fuse(tags, unify):
 def outer_solids(segment, start):
     """Volume tags of one segment's core and chamber blocks, not yet fused; x begins at `start` (mm)."""
     s = segment
-    tags = [_box(start, start + s.length, s.width / 2, s.core_bottom, s.core_top)]
+    tags = [box(start, start + s.length, s.width / 2, s.core_bottom, s.core_top)]
     for x in start + s.chamber_positions:
         for side in s.sides:
             # from the channel axis upwards: well inside the core, so that only the sides are coplanar
-            tags.append(_chamber(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top))
+            tags.append(chamber_block(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top))
     return tags
 
 
@@ -88,10 +88,10 @@ def cavity_solids(segment, start, channel_from, channel_to):
     tags = []
     x0, x1 = max(start, channel_from), min(start + s.length, channel_to)
     if x1 > x0:
-        tags.append(_box(x0, x1, s.channel_width / 2, -s.channel_height / 2, s.channel_height / 2))
+        tags.append(box(x0, x1, s.channel_width / 2, -s.channel_height / 2, s.channel_height / 2))
     for x in start + s.chamber_positions:
         for side in s.sides:
-            tags.append(_chamber(s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top))
+            tags.append(chamber_block(s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top))
     return tags
 
 
@@ -115,10 +115,10 @@ def build(manipulator):
     start_stop = channel_range(manipulator)
     bodies, cavities = [], []
     for segment, start in zip(manipulator.segments, manipulator.starts):
-        bodies += _fuse(outer_solids(segment, start), unify=True)
+        bodies += fuse(outer_solids(segment, start), unify=True)
         cavities += [tag for tag in cavity_solids(segment, start, *start_stop)]
     # seams are kept: they separate the channel's wall from the chambers'
-    cavities = _fuse(cavities, unify=False)
+    cavities = fuse(cavities, unify=False)
     _, parents = occ.fragment(bodies, cavities)
     occ.synchronize()
     cavity_volumes = sorted({v for children in parents[len(bodies) :] for v in children if v[0] == 3})
@@ -143,6 +143,14 @@ def build(manipulator):
     return volumes
 
 
+def in_channel(segment, box):
+    """Whether a cavity face with this bounding box (6 numbers) is a piece of the channel's wall (its ends are not)."""
+    x0, y0, z0, x1, y1, z1 = box
+    in_y = max(abs(y0), abs(y1)) < segment.channel_width / 2 + _TOLERANCE
+    in_z = max(abs(z0), abs(z1)) < segment.channel_height / 2 + _TOLERANCE
+    return in_y and in_z and x1 - x0 > 10 * _TOLERANCE
+
+
 def _tag_volumes(manipulator, body_volumes):
     order = sorted(body_volumes, key=lambda v: gmsh.model.occ.getCenterOfMass(*v)[0])
     for i, (_, tag) in enumerate(order):
@@ -157,10 +165,7 @@ def _tag_faces(manipulator, body_faces, cavity_faces):
         if face in cavity_faces:
             i = int(np.clip(np.searchsorted(manipulator.starts, (x0 + x1) / 2) - 1, 0, None))
             s = manipulator.segments[i]
-            in_y = max(abs(y0), abs(y1)) < s.channel_width / 2 + _TOLERANCE
-            in_z = max(abs(z0), abs(z1)) < s.channel_height / 2 + _TOLERANCE
-            across = x1 - x0 < 10 * _TOLERANCE  # the channel's closed ends and steps are not its wall
-            groups[CHANNEL if in_y and in_z and not across else CAVITY].append(face)
+            groups[CHANNEL if in_channel(s, (x0, y0, z0, x1, y1, z1)) else CAVITY].append(face)
         elif x1 < _TOLERANCE:
             groups[BASE].append(face)
         elif x0 > manipulator.length - _TOLERANCE:

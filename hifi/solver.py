@@ -160,7 +160,7 @@ class Newton:
             if norm <= o.relative_tolerance * scale + o.absolute_tolerance:
                 return NewtonResult(iteration - 1, history)
             tolerance = o.relative_tolerance * scale + o.absolute_tolerance
-            if self.factorised_at is None or (not fresh and _iterations_left(history, tolerance) > o.patience):
+            if self.factorised_at is None or (not fresh and iterations_left(history, tolerance) > o.patience):
                 self.factorise(pressure)
                 fresh = True
             else:
@@ -181,7 +181,7 @@ class Newton:
         self.problem.destroy()
 
 
-def _iterations_left(history, tolerance):
+def iterations_left(history, tolerance):
     """Iterations to `tolerance` at the rate of the last two residuals; 0 when there is no rate yet."""
     if len(history) < 2:
         return 0.0

@@ -1,0 +1,97 @@
+"""One pitch of a uniform segment between two plane cuts, body and air both meshed, with matching faces on the cuts."""
+
+from pathlib import Path
+
+import gmsh
+import numpy as np
+
+from base.errors import InputError
+from base.files import atomic_path
+from geometry import cad
+
+#: physical tag of the air's volume
+AIR = 200
+
+
+def mesh_cell(segment, mesh_size, path, cut=0.0):
+    """Write the cell's mesh to `path`; returns {"body_mm3", "air_mm3", "cells"}.
+
+    x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). InputError when the faces on the two cuts
+    do not match or the mesh fails.
+    """
+    half = segment.pitch / 2
+    with cad.session("cell"):
+        body, air = _build(segment, half, cut)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+        gmsh.option.setNumber("Mesh.RandomSeed", 1)
+        try:
+            gmsh.model.mesh.generate(3)
+        except Exception as error:  # gmsh raises plain Exception with its own text
+            raise InputError(f"gmsh could not mesh this cell: {error}; try another mesh_size_mm") from None
+        facts = {
+            "body_mm3": sum(gmsh.model.occ.getMass(3, v) for v in body),
+            "air_mm3": sum(gmsh.model.occ.getMass(3, v) for v in air),
+            "cells": len(gmsh.model.mesh.getElementsByType(4)[0]),
+        }
+        with atomic_path(Path(path)) as temporary:
+            gmsh.option.setNumber("Mesh.Binary", 1)
+            gmsh.write(str(temporary))
+    return facts
+
+
+def _build(segment, half, cut):
+    """Volume tags (body, air) of the cell; faces and volumes tagged, cuts made periodic."""
+    occ, s = gmsh.model.occ, segment
+    reach = half + s.width / 2 * abs(s.cot) + s.pitch
+    count = int(np.ceil(reach / s.pitch))
+    centres = cut + s.pitch * np.arange(-count, count + 1)
+    outer = [cad.box(-reach, reach, s.width / 2, s.core_bottom, s.core_top)]
+    inner = [cad.box(-reach, reach, s.channel_width / 2, -s.channel_height / 2, s.channel_height / 2)]
+    for x in centres:
+        for side in s.sides:
+            outer.append(cad.chamber_block(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top))
+            inner.append(cad.chamber_block(s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top))
+    solids = []
+    for tags, unify in ((outer, True), (inner, False)):
+        slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
+        solids.append(occ.intersect(cad.fuse(tags, unify), [(3, slab)])[0])
+    _, parents = occ.fragment(*solids)
+    occ.synchronize()
+    air = sorted({t for children in parents[len(solids[0]) :] for d, t in children if d == 3})
+    body = sorted({t for children in parents[: len(solids[0])] for d, t in children if d == 3} - set(air))
+    gmsh.model.addPhysicalGroup(3, body, cad.BODY)
+    gmsh.model.addPhysicalGroup(3, air, AIR)
+    _make_periodic(half, s.pitch)
+    interface = _boundary(body) & _boundary(air)
+    channel = [f for f in interface if cad.in_channel(s, gmsh.model.getBoundingBox(2, f))]
+    gmsh.model.addPhysicalGroup(2, sorted(channel), cad.CHANNEL)
+    gmsh.model.addPhysicalGroup(2, sorted(interface - set(channel)), cad.CAVITY)
+    return body, air
+
+
+def _boundary(volumes):
+    return {abs(t) for _, t in gmsh.model.getBoundary([(3, v) for v in volumes], combined=True, oriented=True)}
+
+
+def _make_periodic(half, pitch):
+    """Match every face on x = +half with its image on x = -half."""
+    tolerance = 1e-5
+    left, right = [], []
+    for _, face in gmsh.model.getEntities(2):
+        box = np.array(gmsh.model.getBoundingBox(2, face))
+        if abs(box[0] + half) < tolerance and abs(box[3] + half) < tolerance:
+            left.append((face, box))
+        elif abs(box[0] - half) < tolerance and abs(box[3] - half) < tolerance:
+            right.append((face, box))
+    shift = [1, 0, 0, pitch, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    for face, box in right:
+        area = gmsh.model.occ.getMass(2, face)
+        images = [
+            f
+            for f, b in left
+            if np.abs(b[[1, 2, 4, 5]] - box[[1, 2, 4, 5]]).max() < tolerance and abs(gmsh.model.occ.getMass(2, f) - area) < tolerance
+        ]
+        if len(images) != 1 or len(left) != len(right):
+            raise InputError("cell: the faces on its two cuts do not match; move the cut")
+        gmsh.model.mesh.setPeriodic(2, [face], images, shift)
