@@ -21,7 +21,8 @@ class Comparison:
     """Curves (n, 3) in mm in target coordinates, and `Errors` between them; None where a part is missing.
 
     reduced: at the design pressure. solved: finite elements at their last pressure; reduced_at_solve, strains: the
-    reduced model re-evaluated there. notes: what a reader must know to read the numbers rightly.
+    reduced model re-evaluated there. nearest: (pressure in MPa, Errors) of the step nearest to the
+    target. notes: what a reader must know to read the numbers rightly.
     """
 
     reduced: np.ndarray | None
@@ -32,6 +33,7 @@ class Comparison:
     solved_target: Errors | None
     reduced_solved: Errors | None
     notes: tuple
+    nearest: tuple | None = None
 
     @classmethod
     def of(cls, run, model):
@@ -45,7 +47,15 @@ class Comparison:
                     f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives for "
                     "design.toml now: it was edited, or predicted by another model. The report shows the model's curve."
                 )
+        nearest = None
+        if run.stale:
+            notes.append(
+                "The finite element solution in this folder is of another body: its dimensions or materials are not those of "
+                "design.toml. It is not shown; run pneunet solve again."
+            )
         if run.solve is not None:
+            if run.target is not None:
+                nearest = _nearest(run)
             solved = se3.transform(design.base_pose, smooth(run.solve.s, run.solve.points))
             if stopped_short(run):
                 last = f"{plain(run.solve.pressure * 1e3)} kPa"
@@ -67,6 +77,7 @@ class Comparison:
             _errors(solved, run.target),
             _errors(at_solve, solved),
             tuple(dict.fromkeys(notes)),
+            nearest,
         )
 
 
@@ -75,6 +86,14 @@ def smooth(s, points, spacing=1.0):
     stations of the finite element solution lie a pitch apart, and their chords cut corners."""
     fine = np.linspace(s[0], s[-1], int(np.ceil((s[-1] - s[0]) / spacing)) + 1)
     return CubicSpline(s, points)(fine)
+
+
+def _nearest(run):
+    """(pressure in MPa, Errors) of the accepted step that is nearest to the target."""
+    tried = []
+    for pressure, s, points in run.solve.history:
+        tried.append((pressure, compare(se3.transform(run.design.base_pose, smooth(s, points)), run.target)))
+    return min(tried, key=lambda item: item[1].rms)
 
 
 def stopped_short(run):
@@ -104,7 +123,8 @@ def verdict(run, comparison):
     c, design = comparison, run.design
     promise = ""
     if c.reduced_target:
-        promise = f"the reduced model predicts to follow the target within {_mm(c.reduced_target)}"
+        at = f"{plain(design.pressure * 1e3)} kPa"
+        promise = f"for {at} the reduced model promises the target within {_mm(c.reduced_target)}"
     if c.solved is None:
         told = promise or "there is neither a target nor a finite element solution to judge the prediction by"
         return f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet." if promise else f"{told[0].upper()}{told[1:]}."
@@ -116,18 +136,28 @@ def verdict(run, comparison):
         word = "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
         sentence = (
             f"At {pressure} the finite element solution of the whole manipulator {word} the reduced prediction: "
-            f"they differ by {_mm(c.reduced_solved)}"
+            f"they differ by {_mm(c.reduced_solved)}, and |k| of a segment by up to {_strain_difference(run, c):.0f} %"
         )
     if promise:
-        sentence += f"; {promise}, the finite element body misses it by {_mm(c.solved_target)}"
+        sentence += f"; {promise}; at {pressure} the finite element body misses it by {_mm(c.solved_target)}"
     elif c.solved_target:
         sentence += f"; the finite element body misses the target by {_mm(c.solved_target)}"
     if stopped_short(run):
-        sentence += f"; it stopped short of the design pressure, {plain(design.pressure * 1e3)} kPa"
+        asked = run.solve.record.get("pressure_kPa", design.pressure * 1e3)
+        reason = "was asked for less than" if asked < design.pressure * 1e3 * (1 - 1e-6) else "stopped short of"
+        sentence += f"; it {reason} the design pressure, {plain(design.pressure * 1e3)} kPa"
+    if c.nearest and c.nearest[0] < run.solve.pressure:
+        sentence += f". Its step nearest to the target is at {plain(c.nearest[0] * 1e3)} kPa, with {_mm(c.nearest[1])}"
     depth = overlap(run)
     if depth > 0:
         sentence += f". Walls overlap by up to {depth:.2f} mm, so the finite element shape is not what a real body would take"
     return sentence + "."
+
+
+def _strain_difference(run, comparison):
+    """Largest |k_reduced - k_FE| over the segments, % of the largest |k| in FE: shows what positions do not."""
+    solved = np.linalg.norm(run.solve.strains.k, axis=1)
+    return 100 * float(np.linalg.norm(comparison.strains.k - run.solve.strains.k, axis=1).max() / solved.max())
 
 
 def _mm(errors):

@@ -68,7 +68,12 @@ def body_pictures(run, comparison, model, folder):
         out.append((name, caption))
 
     if target:
-        picture("target.png", with_target, "target", "The target curve (black in every picture of this row).")
+        picture(
+            "target.png",
+            with_target,
+            "target",
+            "The target curve (black in the other pictures of this row too, where the body does not hide it).",
+        )
     if reduced is not None:
         picture(
             "reduced.png",

@@ -9,7 +9,7 @@ import numpy as np
 from base.errors import InputError
 from base.files import read_columns, read_csv
 from base.strains import RodStrains
-from geometry.designfile import Design, read_design
+from geometry.designfile import Design, body_tables, read_design
 
 POINTS = ["x_mm", "y_mm", "z_mm"]
 STEP_COLUMNS = [
@@ -33,7 +33,8 @@ class Solve:
 
     steps: {column: (n,)}, "seconds" counted from the start; pressure of the last accepted step in MPa; s (m,),
     points (m, 3): its centreline; strains: RodStrains of shape (segments, 3) at that step; walls: [(segment 1..,
-    side +1/-1, gap 1.., distance)] of the gaps that have walls; solution: the ParaView file, or None; record: run.json.
+    side +1/-1, gap 1.., distance)] of the gaps that have walls; history: [(pressure in MPa, s,
+    points)] of all steps; solution: the ParaView file, or None; record: run.json.
     """
 
     steps: dict
@@ -41,6 +42,7 @@ class Solve:
     s: np.ndarray
     points: np.ndarray
     strains: RodStrains
+    history: list
     walls: list
     solution: Path | None
     record: dict
@@ -49,7 +51,7 @@ class Solve:
 @dataclass(frozen=True)
 class Run:
     """directory; design; target (n, 3) and centreline (s (m,), points (m, 3)) in target coordinates; mesh, record: the
-    JSON files; solve."""
+    JSON files; solve; stale: the folder holds a solution of another body than design.toml's, which is left out."""
 
     directory: Path
     design: Design
@@ -58,6 +60,7 @@ class Run:
     record: dict
     mesh: dict
     solve: Solve | None
+    stale: bool = False
 
 
 def read_run(directory):
@@ -68,14 +71,17 @@ def read_run(directory):
     target = directory / "target.csv"
     centreline = directory / "centreline.csv"
     columns = read_columns(centreline, ["s_mm", *POINTS]) if centreline.is_file() else None
+    design, solve = read_design(directory / "design.toml"), _solve(directory / "solve")
+    stale = solve is not None and solve.record.get("body", body_tables(design.manipulator)) != body_tables(design.manipulator)
     return Run(
         directory,
-        read_design(directory / "design.toml"),
+        design,
         read_columns(target, POINTS) if target.is_file() else None,
         None if columns is None else (columns[:, 0], columns[:, 1:]),
         _json(directory / "run.json"),
         _json(directory / "mesh" / "mesh.json"),
-        _solve(directory / "solve"),
+        None if stale else solve,
+        stale,
     )
 
 
@@ -108,10 +114,16 @@ def _solve(directory):
         s=centreline[:, 1],
         points=centreline[:, 2:],
         strains=RodStrains(strains[:, 1:4], strains[:, 4:7]),
+        history=[(row[1] * 1e-3, *_step(centrelines, row[0])) for row in table if row[1] > 0],
         walls=_walls(directory / "walls.csv"),
         solution=solution if solution.is_file() else None,
         record=_json(directory / "run.json"),
     )
+
+
+def _step(centrelines, number):
+    rows = centrelines[centrelines[:, 0] == number]
+    return rows[:, 1], rows[:, 2:]
 
 
 def _walls(path):

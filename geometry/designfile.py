@@ -116,5 +116,10 @@ def design_tables(design):
     return tables
 
 
+def body_tables(manipulator):
+    """What a solution belongs to: every dimension and material of every segment, in file units."""
+    return [{**to_table(s), "material": material_to_table(s.material)} for s in manipulator.segments]
+
+
 def write_design(path, design):
     write_text(path, toml_text(design_tables(design)))

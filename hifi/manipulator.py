@@ -12,6 +12,7 @@ from base.errors import ConvergenceError
 from base.files import output_directory, write_csv
 from base.record import write_record
 from geometry import cad
+from geometry.designfile import body_tables
 from hifi import compat
 from hifi.output import FieldWriter
 from hifi.path import LoadPath
@@ -150,6 +151,27 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
     )
     last, history = [], []
 
+    def record(status, failures=()):
+        if comm.rank == 0:
+            write_record(
+                out,
+                status=status,
+                pressure_kPa=pressure * KPA,
+                pressure_reached_kPa=last[0].pressure * KPA,
+                body=body_tables(design.manipulator),
+                mesh=facts,
+                cells=facts["cells"],
+                dofs=solve.problem.dofs,
+                ranks=comm.size,
+                mesh_size_mm=facts["mesh_size_mm"],
+                wall_seconds=time.perf_counter() - started,
+                timings=solve.newton.timings,
+                newton=vars(solve.newton.options),
+                versions=versions(),
+                failed_attempts=[[load * KPA, why] for load, why in failures],
+                steps=history,
+            )
+
     def keep(m):
         last[:] = [m]
         if writer:
@@ -166,32 +188,20 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
             files.add(m)
             if m.step:
                 say(_progress(m, pressure))
+        record("running, or ended by force")
 
     keep(solve.measure())
-    status, failure, result = "reached the design pressure", None, None
+    status, failure, result = "reached the pressure asked for", None, None
     try:
         result = solve.run(pressure, keep)
+    except KeyboardInterrupt:
+        record("interrupted")
+        say(f"interrupted at {last[0].pressure * KPA:.4g} kPa; the result up to there is in {out}")
+        raise
     except ConvergenceError as error:
         failure, result = error, error.result
         status = f"stopped at {last[0].pressure * KPA:.4g} kPa of {pressure * KPA:g} kPa: {result.reason}"
-    if comm.rank == 0:
-        write_record(
-            out,
-            status=status,
-            pressure_kPa=pressure * KPA,
-            pressure_reached_kPa=last[0].pressure * KPA,
-            mesh=facts,
-            cells=facts["cells"],
-            dofs=solve.problem.dofs,
-            ranks=comm.size,
-            mesh_size_mm=facts["mesh_size_mm"],
-            wall_seconds=time.perf_counter() - started,
-            timings=solve.newton.timings,
-            newton=vars(solve.newton.options),
-            versions=versions(),
-            failed_attempts=[[load * KPA, why] for load, why in result.failures],
-            steps=history,
-        )
+    record(status, result.failures)
     solve.destroy()
     if failure:
         raise ConvergenceError(

@@ -4,6 +4,7 @@ Open MPI refuses to run as root and to run more ranks than it counts cores, and 
 read different variables to be told otherwise. Here they are all told, whichever is installed.
 """
 
+import ctypes
 import os
 import shutil
 import signal
@@ -57,6 +58,12 @@ def command_line(ranks: int, command: list[str]) -> list[str]:
     return ["mpirun", "-n", str(ranks), *program]
 
 
+def _die_with_parent():
+    """Killed ourselves, even by SIGKILL, we leave no ranks behind that would write into the next run's results."""
+    PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
 def run(ranks: int, command: list[str]) -> int:
     """Run `command` on `ranks` ranks, with our standard streams; returns its exit code."""
     try:
@@ -69,7 +76,7 @@ def run(ranks: int, command: list[str]) -> int:
         if shutil.which(needed, path=env["PATH"]) is None:
             print(f"pneunet run: {needed} not found (make setup; pneunet doctor tells more)", file=sys.stderr)
             return 127
-    with subprocess.Popen(line, env=env) as process:
+    with subprocess.Popen(line, env=env, preexec_fn=_die_with_parent) as process:
         # Told to end, we tell mpirun, so that no rank is left behind.
         previous = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
         try:

@@ -7,7 +7,7 @@ import numpy as np
 
 from base.files import write_csv
 from base.strains import RodStrains
-from geometry.designfile import Design, write_design
+from geometry.designfile import Design, body_tables, write_design
 from geometry.parameters import Manipulator, Segment
 from reduced.model import AnalyticModel, predict
 from reduced.rod import centreline
@@ -100,6 +100,7 @@ def _solve(folder, design, model, reached, overlap, fields):
                 "dofs": 12345,
                 "versions": {"dolfinx": "0.5.2"},
                 "status": "reached",
+                "body": body_tables(manipulator),
                 "steps": [[1], [2]],
             }
         )

@@ -45,6 +45,26 @@ def test_solution_that_stopped_short_is_compared_at_its_own_pressure(tmp_path):
     assert "stops at 12 kPa" in c.notes[0] and "stopped short" in verdict(run, c)
 
 
+def test_solution_of_another_body_is_left_out_and_told(tmp_path):
+    make_run(tmp_path, fields=False)
+    assert not read_run(tmp_path).stale
+    path = tmp_path / "design.toml"
+    text = path.read_text()
+    width = next(line for line in text.splitlines() if line.startswith("width_mm"))
+    path.write_text(text.replace(width, "width_mm = 13.5"))
+    run, c = judged(tmp_path)
+    assert run.stale and run.solve is None and c.solved is None
+    assert any("another body" in note for note in c.notes)
+
+
+def test_step_nearest_to_the_target_is_named(tmp_path):
+    make_run(tmp_path, fields=False)
+    run, c = judged(tmp_path)
+    pressure, errors = c.nearest
+    assert errors.rms <= c.solved_target.rms
+    assert pressure in [row[0] for row in run.solve.history]
+
+
 def test_verdict_tells_agreement_contradiction_and_overlap(tmp_path):
     make_run(tmp_path / "a", (PLANE,), pressure=0.001, fields=False)
     assert "confirms the reduced prediction" in verdict(*judged(tmp_path / "a"))

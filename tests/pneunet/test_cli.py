@@ -171,7 +171,7 @@ def test_tables_of_a_solve_agree_with_each_other(folder):
 
 def test_record_of_a_solve_is_complete(folder):
     record = json.loads((folder / "run 1" / "solve" / "run.json").read_text())
-    assert record["status"] == "reached the design pressure" and record["ranks"] == 1
+    assert record["status"] == "reached the pressure asked for" and record["ranks"] == 1
     assert record["pressure_reached_kPa"] == record["pressure_kPa"] == pytest.approx(10.0)
     assert {"dolfinx", "petsc4py", "mpi", "numpy"} <= set(record["versions"])
     steps = table(folder / "run 1" / "solve" / "steps.csv", STEPS)
@@ -230,4 +230,4 @@ def test_report_shows_target_prediction_and_solution(folder):
     pictures = list((folder / "run 1" / "report").glob("*.png"))
     assert len(pictures) >= 8 and page.count("data:image/png;base64,") == len(pictures)
     assert not re.search(r"(src|href)=\"(?!data:)", page) and str(folder) not in page
-    assert "stopped short" in page  # 10 of 40 kPa, and it says so
+    assert "was asked for less than the design pressure" in page  # 10 of 40 kPa, and it says so
