@@ -98,7 +98,6 @@ class CellProblem:
         self.reduced[kept] = np.arange(len(kept))
         self.reduced = np.where(used, self.reduced[master], -1)
         self.unknowns = len(kept)
-        self._first = kept
 
     def _define_gauge(self):
         """gauge (unknowns, 6) and gauge_strains (6, 6): the section frame's conditions are linear in u and (e, k).

@@ -41,7 +41,6 @@ class CellPath:
         self._x = np.concatenate([np.zeros(n + 6), problem.strains.value])  # unknowns, gauge multipliers, strains
         self._accepted = []
         self._solver = self._matrix = None
-        self._size = n + 6
         if self.fixed:
             self._newton()
         else:

@@ -45,16 +45,6 @@ def mixed_space(mesh, degree=2):
 
 
 @quiet_compiler()
-def lagrange_space(mesh, degree, components=1):
-    """Continuous Lagrange space, scalar or vector."""
-    if OLD:
-        space = fem.FunctionSpace if components == 1 else fem.VectorFunctionSpace
-        return space(mesh, ("CG", degree))
-    shape = () if components == 1 else (components,)
-    return fem.functionspace(mesh, ("Lagrange", degree, shape))
-
-
-@quiet_compiler()
 def compile_form(form):
     """A compiled form with the project's compiler arguments."""
     return fem.form(form, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER}))
@@ -102,17 +92,6 @@ def read_mesh(path, comm):
     finally:
         if comm.rank == 0:
             gmsh.finalize()
-
-
-def original_cell_index(mesh):
-    """(local cells,) index of each cell in the file it was read from."""
-    return np.asarray(mesh.topology.original_cell_index)
-
-
-def geometry_dofmap(mesh):
-    """(local cells, nodes per cell) geometry nodes of each cell."""
-    dofmap = mesh.geometry.dofmap
-    return dofmap.array.reshape(-1, dofmap.array.size // dofmap.num_nodes) if OLD else np.asarray(dofmap)
 
 
 def cell_dofs(space):

@@ -47,9 +47,6 @@ class DirectSolver:
         self.ksp.solve(right, self._solution)
         return self._solution
 
-    def negative_pivots(self):
-        return self.ksp.getPC().getFactorMatrix().getMumpsInfog(12)
-
     def destroy(self):
         self.ksp.destroy()
         self._solution.destroy()
