@@ -23,28 +23,11 @@ def setup():
 
 def ranks():
     """Largest relative difference between 1 and 2 ranks over the numbers of tests/reference_case.py."""
+    from tests import reference_case
+
     with tempfile.TemporaryDirectory() as folder:
-        results = []
-        for n in (1, 2):
-            out = Path(folder) / f"{n}.json"
-            command = [
-                sys.executable,
-                "-m",
-                "pneunet",
-                "run",
-                "-n",
-                str(n),
-                "--",
-                sys.executable,
-                "-m",
-                "tests.reference_case",
-                str(out),
-            ]
-            subprocess.run(command, cwd=ROOT, check=True)
-            results.append(json.loads(out.read_text()))
-    one, two = results
-    scale = {name: 0.01 if "per_mm" in name else 1.0 for name in one}
-    return {"rank_agreement_rel": max(abs(two[n] - v) / max(abs(v), scale[n]) for n, v in one.items())}
+        one, two = (reference_case.on_ranks(n, Path(folder) / f"{n}.json") for n in (1, 2))
+    return {"rank_agreement_rel": reference_case.largest_difference(one, two)}
 
 
 def demo():

@@ -6,6 +6,7 @@ import numpy as np
 
 from base.files import atomic_path, write_text
 from hifi import compat
+from hifi.surface import EDGES
 
 QUADRATIC_TETRA = 24
 #: dolfinx's P2 node order -> VTK's
@@ -38,8 +39,6 @@ class FieldWriter:
         corner = self.problem.pressure_field()
         p2 = compat.cell_dofs(self.problem.displacement_space)
         p1 = compat.cell_dofs(self.problem.pressure_space)
-        from hifi.surface import EDGES
-
         out = np.zeros(len(self.problem.nodes))
         out[p2[:, :4]] = corner[p1]
         for i, (a, b) in enumerate(EDGES):

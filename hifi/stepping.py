@@ -41,7 +41,6 @@ class StepResult:
 
     steps: list = field(default_factory=list)
     failures: list = field(default_factory=list)
-    finished: bool = False
     reason: str = ""
 
 
@@ -58,7 +57,7 @@ def lagrange_coefficients(known, wanted):
 
 
 def run_steps(path, target, size, on_step=lambda step: None):
-    """Drive `path` from its current load to `target`; return a StepResult with finished=True.
+    """Drive `path` from its current load to `target`; return a StepResult.
 
     path.load, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
     its last accepted state. `on_step(step)` is called after each accepted step (hooks write results there). Raises
@@ -98,5 +97,4 @@ def run_steps(path, target, size, on_step=lambda step: None):
         elif iterations > 2 * size.target_iterations:
             step = max(attempted * 0.7, size.smallest)
         on_step(accepted)
-    result.finished = True
     return result

@@ -4,6 +4,7 @@ Its numbers must be the same on one and two ranks, on Debian 12 and 13, natively
 """
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -30,6 +31,20 @@ def numbers():
     out |= {"smallest_wall_distance_mm": float(measured.walls.min())} if measured.walls is not None else {}
     solve.destroy()
     return out
+
+
+def on_ranks(ranks, path):
+    """`numbers()` of a run on so many ranks, started as a user would; `path` is where it leaves them."""
+    python = sys.executable
+    command = [python, "-m", "pneunet", "run", "-n", str(ranks), "--", python, "-m", "tests.reference_case", str(path)]
+    subprocess.run(command, check=True, cwd=DATA.parent.parent, timeout=300)
+    return json.loads(Path(path).read_text())
+
+
+def largest_difference(one, two):
+    """Largest difference of two results, relative to the larger of a value and 1 (0.01 for curvatures, 1/mm)."""
+    scale = {name: 0.01 if "per_mm" in name else 1.0 for name in one}
+    return max(abs(two[name] - value) / max(abs(value), scale[name]) for name, value in one.items())
 
 
 def main(path):
