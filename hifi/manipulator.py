@@ -14,12 +14,14 @@ from base.record import write_record
 from geometry import cad
 from geometry.designfile import body_tables
 from hifi import compat
+from hifi.body import BodySystem
+from hifi.control import LoadControl
+from hifi.loads import Pressure
 from hifi.output import FieldWriter
-from hifi.path import LoadPath
+from hifi.path import EquilibriumPath
 from hifi.problem import MixedProblem, Support
 from hifi.rod_coordinates import RodCoordinates
 from hifi.sections import SectionFrames
-from hifi.solver import Newton
 from hifi.stepping import StepSize, run_steps
 from hifi.stretch import PrincipalStretch
 from hifi.walls import WallDistances
@@ -54,14 +56,18 @@ class ManipulatorSolve:
         if flip_y:
             mesh.geometry.x[:, 1] *= -1
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
-        self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, (cad.CAVITY, cad.CHANNEL), [Support(cad.BASE)])
+        self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
+        self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, [Support(cad.BASE)], [self.pressure])
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
         coordinates = RodCoordinates(self.problem.nodes, self.problem.owned_nodes, comm, spacing)
-        self.newton = Newton(self.problem, coordinates, newton_options)
-        self.path = LoadPath(self.newton)
+        self.system = BodySystem(self.problem, coordinates, self._apply)
+        self.path = EquilibriumPath(self.system, LoadControl(), newton_options)
         self.sections = SectionFrames(self.problem, manipulator)
         self.walls = WallDistances(self.problem, manipulator)
         self.stretch = PrincipalStretch(self.problem)
+
+    def _apply(self, load):
+        self.pressure.value.value = load
 
     def measure(self, step=None):
         """Measured of the current state; collective."""

@@ -1,59 +1,74 @@
-"""The equilibrium path of a MixedProblem under a growing load: predictor, corrector, memory."""
+"""The equilibrium path of a system under a growing control parameter: predictor, corrector, memory."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from hifi.newton import Newton
 from hifi.solver import NotConverged, PredictorTooFar
 from hifi.stepping import lagrange_coefficients
 
 
-class LoadPath:
-    """Predicts by quadratic extrapolation in rod coordinates, corrects by Newton.
+@dataclass(frozen=True)
+class PathState:
+    """An accepted state: control parameter, load, and the system's state array."""
 
-    `pressure(load)` gives the cavity pressure in MPa (by default the load itself); supports follow the load too.
-    """
+    parameter: float
+    load: float
+    state: np.ndarray
+
+
+class EquilibriumPath:
+    """Predicts by polynomial extrapolation in the control's parameter, corrects by Newton."""
 
     memory = 3
 
-    def __init__(self, newton, pressure=lambda load: load):
-        self.newton, self.problem, self.pressure = newton, newton.problem, pressure
-        self.load = 0.0
-        self.accepted = [(0.0, self.problem.array.copy())]
-        self._slope = None
+    def __init__(self, system, control, options=None, start=0.0):
+        self.system, self.control = system, control
+        self.newton = Newton(system, control, options)
+        self.parameter = start
+        self.accepted = [PathState(start, system.load, system.state.copy())]
+        self._tangent = None
         #: predicted residuals (relative to the load) above this failed before; a residual is 10x cheaper than a failure
         self._trusted = np.inf
 
-    def _predict(self, load):
-        known = self.accepted[-self.memory :]
-        newton, problem = self.newton, self.problem
+    def _predict(self, parameter):
+        system, known = self.system, self.accepted[-self.memory :]
         if len(known) == 1:
-            # (u = 0, P > 0) has load stiffness without membrane stress: start with the tangent at P = 0
-            if self._slope is None:
-                newton.factorise(0.0)
-                self._slope = newton.load_direction()
-            return newton.move(known[0][1], self.pressure(load) * self._slope)
-        weights = lagrange_coefficients([t for t, _ in known], load)
-        predicted = sum(w * a for w, (_, a) in zip(weights, known))
-        dofs, X = problem.displacement_dofs, newton.coordinates.nodes
-        predicted[dofs] = newton.coordinates.extrapolate([X + a[dofs] for _, a in known], weights) - X
-        return predicted
+            # (u = 0, P > 0) has load stiffness without membrane stress: start with the tangent at the start
+            if self._tangent is None:
+                self.newton.factorise()
+                self._tangent = self.control.tangent(system)
+            step = parameter - known[0].parameter
+            system.load = known[0].load + step * self._tangent[1]
+            return system.moved(known[0].state, step * self._tangent[0])
+        weights = lagrange_coefficients([a.parameter for a in known], parameter)
+        system.load = sum(w * a.load for w, a in zip(weights, known))
+        return system.extrapolated([a.state for a in known], weights)
 
-    def advance(self, load):
-        """Solve at `load`; (iterations, factorisations, residual). NotConverged restores the accepted state."""
-        before = self.newton.solver.factorisations
-        pressure = self.pressure(load)
-        self.problem.set_array(self.problem.supported(self._predict(load), load))
-        _, norm, scale = self.newton.residual(pressure)
+    def _back(self, kept):
+        self.system.state, self.system.load = kept.state, kept.load
+
+    def advance(self, parameter):
+        """Solve at `parameter`; (iterations, factorisations, residual). NotConverged restores the accepted state."""
+        system, newton, before = self.system, self.newton, self.system.factorisations
+        state = self._predict(parameter)
+        if self.control.name == "load":
+            system.load = parameter
+        system.state = system.at_supports(state)
+        _, norm, scale = newton.residual()
         try:
             if not norm <= self._trusted * scale:
                 raise PredictorTooFar(f"the predicted state is off by {norm / scale:.1e} of the load")
-            result = self.newton.solve(pressure)
+            result = newton.solve(parameter)
         except NotConverged as error:
             if not isinstance(error, PredictorTooFar):
                 self._trusted = 0.5 * norm / scale
-                self.newton.factorised_at = None
-            self.problem.set_array(self.accepted[-1][1])
+                newton.current = False
+            self._back(self.accepted[-1])
             raise
         self._trusted *= 1.1  # so that one bad spot does not slow the rest
-        self.load = load
-        self.accepted = self.accepted[-self.memory + 1 :] + [(load, self.problem.array.copy())]
-        return result.iterations, self.newton.solver.factorisations - before, result.residuals[-1]
+        self.parameter = parameter
+        self.control.accepted(parameter, system)
+        self.accepted = self.accepted[-self.memory + 1 :] + [PathState(parameter, system.load, system.state.copy())]
+        return result.iterations, system.factorisations - before, result.residuals[-1]

@@ -1,8 +1,8 @@
 """The mixed u-p boundary value problem: unknowns, residual, tangent.
 
-psi = W(F) + p (J - 1) with Taylor-Hood P2/P1, plus -P V for the pressure in a closed cavity, whose variation is the
-follower load P inner(J inv(F).T N, v) on the cavity surface. Volume forms are integrated with degree 4 and pressure
-facets with degree 4, which is exact for the latter on straight-sided cells, so that the load tangent is symmetric.
+psi = W(F) + p (J - 1) with Taylor-Hood P2/P1, plus the loads' terms (hifi.loads). Volume forms are integrated with
+degree 4 and pressure facets with degree 4, which is exact for the latter on straight-sided cells, so that the tangent of
+the pressure in a closed cavity is symmetric.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,6 @@ from hifi import compat
 from hifi.materials import ENERGIES, PARAMETERS
 
 VOLUME_DEGREE = 4
-PRESSURE_DEGREE = 4
 
 
 @dataclass(frozen=True)
@@ -34,14 +33,15 @@ class Support:
 
 
 class MixedProblem:
-    """A body, its materials, its clamps and one follower pressure.
+    """A body, its materials, its clamps and its loads.
 
     mesh, cell_tags, facet_tags: as dolfinx gives them. materials: {cell tag: base.materials law}, or one law.
-    pressure_tags: facet tags of the loaded surface (none: no pressure). supports: list of `Support`.
+    supports: list of `Support`. loads: list of hifi.loads objects; the first closed `Pressure` is the cavity whose
+    volume is measured. body_force(X) -> UFL vector in N/mm3, for manufactured solutions.
     """
 
-    def __init__(self, mesh, cell_tags, facet_tags, materials, pressure_tags, supports):
-        self.mesh, self.facet_tags = mesh, facet_tags
+    def __init__(self, mesh, cell_tags, facet_tags, materials, supports, loads=(), body_force=None):
+        self.mesh, self.cell_tags, self.facet_tags = mesh, cell_tags, facet_tags
         self.space = compat.mixed_space(mesh)
         self.state = fem.Function(self.space)
         displacement_space, to_mixed = self.space.sub(0).collapse()
@@ -52,30 +52,34 @@ class MixedProblem:
         self.nodes = displacement_space.tabulate_dof_coordinates()[: len(self.displacement_dofs)].copy()
         pressure_space, to_mixed_p = self.space.sub(1).collapse()
         self.pressure_space, self.pressure_dofs = pressure_space, np.asarray(to_mixed_p)
+        #: number of incompressibility multipliers of all ranks: so many negative pivots has a stable tangent
+        self.constraints = pressure_space.dofmap.index_map.size_global
+        self.owned = self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs
         self.supports = list(supports)
         self.bcs = [self._support_condition(support) for support in self.supports]
         #: supported dofs of the mixed vector: those this rank sees, and those it owns
         self.fixed_dofs = np.unique(np.concatenate([bc.dof_indices()[0] for bc in self.bcs] + [np.zeros(0, np.int32)]))
-        self._fixed_owned = self.fixed_dofs[self.fixed_dofs < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
-        self.pressure = fem.Constant(mesh, PETSc.ScalarType(0.0))
+        self._fixed_owned = self.fixed_dofs[self.fixed_dofs < self.owned]
+        self.loads = list(loads)
+        self.symmetric = all(load.closed for load in self.loads)
 
         u, p = ufl.split(self.state)
-        v = ufl.TestFunction(self.space)
+        v, q = ufl.split(ufl.TestFunction(self.space))
         F = ufl.Identity(3) + ufl.grad(u)
         J = ufl.det(F)
         dx = ufl.Measure("dx", domain=mesh, subdomain_data=cell_tags, metadata={"quadrature_degree": VOLUME_DEGREE})
-        ds = ufl.Measure("ds", domain=mesh, subdomain_data=facet_tags, metadata={"quadrature_degree": PRESSURE_DEGREE})
-        cavity = ds(tuple(pressure_tags) or (0,))  # gmsh numbers its tags from 1
-        N = ufl.FacetNormal(mesh)
         stored = self._stored_energy(F, cell_tags, materials, dx)
-        internal = ufl.derivative(stored + p * (J - 1) * dx, self.state, v)
-        # d(-V)/du: the load per unit of pressure
-        load = ufl.inner(J * ufl.inv(F).T * N, ufl.split(v)[0]) * cavity
-        X = ufl.SpatialCoordinate(mesh)
+        internal = ufl.derivative(stored + p * (J - 1) * dx, self.state, ufl.TestFunction(self.space))
+        terms = [(load, load.term(self, u, v)) for load in self.loads]
+        external = [term for _, term in terms]
+        if body_force is not None:
+            external.append(-ufl.inner(body_force(ufl.SpatialCoordinate(mesh)), v) * dx)
+        stiff = [term for load, term in terms if load.has_tangent]
         self._internal = compat.compile_form(internal)
-        self._load = compat.compile_form(load)
-        self._tangent = compat.compile_form(ufl.derivative(internal + self.pressure * load, self.state))
-        self._volume = compat.compile_form(-ufl.inner(X + u, J * ufl.inv(F).T * N) / 3 * cavity)
+        self._external = compat.compile_form(sum(external)) if external else None
+        self._tangent = compat.compile_form(ufl.derivative(internal + sum(stiff) if stiff else internal, self.state))
+        self._cavity = next((load for load in self.loads if hasattr(load, "volume_form")), None)
+        self._volume = compat.compile_form(self._cavity.volume_form) if self._cavity else None
         self._energy = compat.compile_form(stored)
         self.deformation_gradient = F
         self._vectors = {}
@@ -141,57 +145,58 @@ class MixedProblem:
         return self.space.dofmap.index_map.size_global * self.space.dofmap.index_map_bs
 
     # ---- residual pieces
-    def _assemble(self, name, form):
-        if name not in self._vectors:
-            self._vectors[name] = fem.petsc.create_vector(form)
-        b = self._vectors[name]
+    def _assemble(self, form):
+        if form not in self._vectors:
+            self._vectors[form] = fem.petsc.create_vector(form)
+        b = self._vectors[form]
         with b.localForm() as local:
             local.set(0.0)
         fem.petsc.assemble_vector(b, form)
         b.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return b
+        return b.array.copy()
 
-    def residual(self, pressure):
-        """(PETSc vector in N and mm3, norm of what it balances in N) at the current state.
+    def external_force(self):
+        """(owned dofs,) minus the forces of all loads (N) at the current state and values; supports included."""
+        if self._external is None:
+            return np.zeros(self.owned)
+        for load in self.loads:
+            load.update(self)
+        return self._assemble(self._external)
 
-        The scale is the larger of the pressure load's and the support reactions' norm; supported entries are zero.
+    def residual(self):
+        """((owned dofs,) residual in N and mm3, norm of what it balances in N) at the current state and load values.
+
+        The scale is the larger of the loads' and the support reactions' norm; supported entries are zero.
         """
-        r = self._assemble("internal", self._internal)
-        scale = 0.0
-        if pressure:
-            load = self.load_force()
-            r.axpy(pressure, load)
-            scale = abs(pressure) * load.norm()
-        reactions = r.array[self._fixed_owned]
-        scale = max(scale, np.sqrt(self._sum(reactions @ reactions)))
-        r.array[self._fixed_owned] = 0.0
-        return r, scale
+        r, external = self._assemble(self._internal), self.external_force()
+        scale = self._sum(external @ external)
+        r += external
+        reactions = r[self._fixed_owned]
+        scale = max(scale, self._sum(reactions @ reactions))
+        r[self._fixed_owned] = 0.0
+        return r, np.sqrt(scale)
 
-    def load_force(self):
-        """PETSc vector (mm2): residual per unit of cavity pressure at the current state, -dV/du; zero at supports."""
-        b = self._assemble("load", self._load)
-        b.array[self._fixed_owned] = 0.0
-        return b
+    def unsupported(self, vector):
+        """`vector` (owned dofs,) with zeros at the supports."""
+        vector[self._fixed_owned] = 0.0
+        return vector
 
-    def reaction(self, tag, pressure, point=(0.0, 0.0, 0.0)):
+    def reaction(self, tag, point=(0.0, 0.0, 0.0)):
         """(force (3,) in N, moment (3,) in N mm about `point`) with which the tagged support holds the body."""
-        r = self._assemble("internal", self._internal)
-        if pressure:
-            r.axpy(pressure, self._assemble("load", self._load))
+        r = self._assemble(self._internal) + self.external_force()
         nodes = fem.locate_dofs_topological(self.displacement_space, 2, self.facet_tags.find(tag))
         nodes = nodes[nodes < self.owned_nodes]
-        force = r.array[self.displacement_dofs[nodes]]
+        force = r[self.displacement_dofs[nodes]]
         arm = self.nodes[nodes] + self.displacement()[nodes] - np.asarray(point)
         return self._sum(force.sum(axis=0)), self._sum(np.cross(arm, force).sum(axis=0))
 
     def create_tangent(self):
         A = fem.petsc.create_matrix(self._tangent)
-        A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        A.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         return A
 
-    def assemble_tangent(self, A, pressure):
-        """Assemble the tangent at the current state and the given pressure (MPa) into A."""
-        self.pressure.value = pressure
+    def assemble_tangent(self, A):
+        """Assemble the tangent at the current state and load values into A."""
         A.zeroEntries()
         fem.petsc.assemble_matrix(A, self._tangent, bcs=self.bcs)
         A.assemble()
@@ -201,7 +206,9 @@ class MixedProblem:
         return self.mesh.comm.allreduce(value, op=MPI.SUM)
 
     def cavity_volume(self):
-        """Volume (mm3) of the closed cavity."""
+        """Volume (mm3) of the closed cavity; 0 without one."""
+        if self._volume is None:
+            return 0.0
         return float(self._sum(fem.assemble_scalar(self._volume)))
 
     def stored_energy(self):

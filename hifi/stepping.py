@@ -59,18 +59,18 @@ def lagrange_coefficients(known, wanted):
 def run_steps(path, target, size, on_step=lambda step: None):
     """Drive `path` from its current load to `target`; return a StepResult.
 
-    path.load, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
+    path.parameter, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
     its last accepted state. `on_step(step)` is called after each accepted step (hooks write results there). Raises
     ConvergenceError, with the StepResult as its `result`, when steps fall below size.smallest.
     """
     result = StepResult()
-    milestones = sorted({m for m in size.milestones if path.load < m < target} | {target})
+    milestones = sorted({m for m in size.milestones if path.parameter < m < target} | {target})
     step, started = size.first, time.perf_counter()
     while milestones:
-        remaining = milestones[0] - path.load
+        remaining = milestones[0] - path.parameter
         # hit the milestone exactly, and never leave a sliver of a step before it
-        load = milestones[0] if step > 0.999 * remaining else path.load + (step if step < 0.6 * remaining else remaining / 2)
-        attempted = load - path.load
+        load = milestones[0] if step > 0.999 * remaining else path.parameter + (step if step < 0.6 * remaining else remaining / 2)
+        attempted = load - path.parameter
         try:
             iterations, factorisations, residual = path.advance(load)
         except PredictorTooFar:
@@ -82,7 +82,7 @@ def run_steps(path, target, size, on_step=lambda step: None):
             if step < size.smallest:
                 result.reason = str(error)
                 failure = ConvergenceError(
-                    f"stopped at load {path.load:.6g}: the next step of {attempted:.2g} did not converge ({error}); "
+                    f"stopped at load {path.parameter:.6g}: the next step of {attempted:.2g} did not converge ({error}); "
                     "results up to there are kept. A limit point (ballooning), touching walls or a coarse mesh are the usual causes"
                 )
                 failure.result = result

@@ -111,3 +111,22 @@ class SlabIntegral:
         """(16,) moments of the rigid fit from the undeformed surface to nodal `positions` (all local nodes, 3)."""
         x = positions[self.nodes]
         return np.concatenate([[self.area], self.centre, self.weights @ x, (self.first.T @ x).ravel()])
+
+
+class FaceQuadrature:
+    """Integrals over a tagged face of quantities that depend on the deformed position; weights are reference areas."""
+
+    def __init__(self, problem, tag):
+        self.comm = problem.mesh.comm
+        self._facets = facet_nodes(problem, tag)
+        self._weights = np.outer(reference_areas(problem, self._facets), _WEIGHTS)
+        self._shape = p2_shape(_BARYCENTRIC)
+
+    def moments(self, positions):
+        """(area, centre (3,), central second moment (3, 3) in mm^4) of the face at nodal `positions` (all local nodes, 3)."""
+        x = np.einsum("qn,fni->fqi", self._shape, positions[self._facets])
+        w = self._weights
+        sums = np.concatenate([[w.sum()], np.einsum("fq,fqi->i", w, x), np.einsum("fq,fqi,fqj->ij", w, x, x).ravel()])
+        sums = self.comm.allreduce(sums)
+        area, centre = sums[0], sums[1:4] / sums[0]
+        return area, centre, sums[4:].reshape(3, 3) - area * np.outer(centre, centre)

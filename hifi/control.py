@@ -1,0 +1,102 @@
+"""What closes the equations for the load along a path: the load itself, the cavity's volume, or the arc length.
+
+A control offers, for the path's scalar parameter,
+    satisfied(system, parameter)                   whether its own equation holds
+    close(system, parameter, step, load_step)      the correction completed so that its linearised equation holds
+    tangent(system) -> (d state, d load)           per unit of the parameter, with the factorised tangent
+    accepted(parameter, system)                    told after every accepted state
+"""
+
+import numpy as np
+
+
+class LoadControl:
+    """The parameter is the load."""
+
+    name = "load"
+
+    def satisfied(self, system, parameter):
+        return system.load == parameter
+
+    def close(self, system, parameter, step, load_step):
+        return step, 0.0  # the predictor has set the load
+
+    def tangent(self, system):
+        return -system.solve(system.load_gradient()), 1.0
+
+    def accepted(self, parameter, system):
+        pass
+
+
+class _Bordered:
+    """One more unknown, the load, and one more equation g(state) = parameter with gradient `row`: block elimination."""
+
+    def close(self, system, parameter, step, load_step):
+        along = -system.solve(system.load_gradient())
+        row = self.row(system)
+        missing = -self.gap(system, parameter) - system.dot(row, step)
+        change = missing / system.dot(row, along)
+        return step + change * along, load_step + change
+
+    def tangent(self, system):
+        along = -system.solve(system.load_gradient())
+        rate = system.dot(self.row(system), along)
+        return along / rate, 1.0 / rate
+
+    def accepted(self, parameter, system):
+        pass
+
+
+class VolumeControl(_Bordered):
+    """The parameter is the cavity's volume (mm3), the load its pressure: walks through limit points of the pressure.
+
+    The energy's load term is -P V, so the gradient of the volume is minus the residual's derivative by the load.
+    """
+
+    name = "volume"
+    relative_tolerance = 1e-10
+
+    def gap(self, system, parameter):
+        return system.volume() - parameter
+
+    def row(self, system):
+        return -system.load_gradient()
+
+    def satisfied(self, system, parameter):
+        return abs(self.gap(system, parameter)) <= self.relative_tolerance * abs(parameter)
+
+
+class ArcLength(_Bordered):
+    """The parameter is the distance walked along the secant of the last two accepted states (Riks 1979).
+
+    Distance is the root mean square displacement of the nodes in mm: it also grows where load and volume turn back.
+    """
+
+    name = "arc length"
+
+    def __init__(self, system):
+        self._last, self._parameter = system.positions().copy(), 0.0
+        self._direction = None
+
+    def _secant(self, system):
+        if self._direction is None:  # at the start, along the tangent
+            along = system.positions_part(-system.solve(system.load_gradient()))
+            self._direction = along / np.sqrt(system.mean_square(along, along))
+        return self._direction
+
+    def gap(self, system, parameter):
+        moved = system.positions() - self._last
+        return system.mean_square(self._secant(system), moved) - (parameter - self._parameter)
+
+    def row(self, system):
+        return system.mean_square_row(self._secant(system))
+
+    def satisfied(self, system, parameter):
+        return abs(self.gap(system, parameter)) <= 1e-8 * abs(parameter - self._parameter)
+
+    def accepted(self, parameter, system):
+        moved = system.positions() - self._last
+        length = np.sqrt(system.mean_square(moved, moved))
+        if length > 0:
+            self._direction = moved / length
+        self._last, self._parameter = system.positions().copy(), parameter
