@@ -1,0 +1,84 @@
+"""The meshes of the speed benches, as each code wants them: gmsh's file for ours, plain arrays for the others."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from base.files import atomic_path
+
+
+def segment():
+    """Case twist-w12, 60 degrees, three pairs of chambers."""
+    from geometry import Manipulator
+    from tests.cases import CASES
+
+    return Manipulator((CASES["twist_w12"](angle=60.0, chambers=3),))
+
+
+def make(directory, mesh_size, manipulator=None):
+    """Folder with manipulator.msh, mesh.json and mesh.npz for this mesh size (mm); made once.
+
+    mesh.npz: points (n, 3) in mm, tets (m, 4), base, cavity and channel (k, 4) tets whose first three vertices are a
+    facet of that surface, all of positive volume, and the rules with which ours integrates: volume_points (q, 3),
+    volume_weights, facet_points (q, 2), facet_weights on the unit simplices.
+    """
+    from geometry.mesh import mesh_manipulator, segment_tables
+
+    directory, manipulator = Path(directory), manipulator or segment()
+    facts = directory / "mesh.json"
+    if facts.exists() and (directory / "mesh.npz").exists():
+        known = json.loads(facts.read_text())
+        if known["mesh_size_mm"] == mesh_size and known["segments"] == json.loads(json.dumps(segment_tables(manipulator))):
+            return directory
+    mesh_manipulator(manipulator, mesh_size, directory)
+    with atomic_path(directory / "mesh.npz") as temporary:
+        with open(temporary, "wb") as file:
+            np.savez(file, **arrays(directory / "manipulator.msh"))
+    return directory
+
+
+def arrays(path):
+    """What mesh.npz holds, of a gmsh file."""
+    import gmsh
+
+    from geometry import cad
+
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(path))
+        tags, points, _ = gmsh.model.mesh.getNodes()
+        order = np.argsort(tags)
+        tets = np.searchsorted(tags[order], gmsh.model.mesh.getElementsByType(4)[1].reshape(-1, 4))
+        found = {"points": points.reshape(-1, 3)[order], "tets": tets}
+        for name, tag in (("base", cad.BASE), ("cavity", cad.CAVITY), ("channel", cad.CHANNEL)):
+            entities = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
+            facets = np.concatenate([gmsh.model.mesh.getElementsByType(2, e)[1].reshape(-1, 3) for e in entities])
+            found[name] = owners(tets, np.searchsorted(tags[order], facets))
+    finally:
+        gmsh.finalize()
+    assert len(np.unique(tets)) == len(tags)
+    return found | rules()
+
+
+def owners(tets, facets):
+    """Tets (k, 4) that own the facets (k, 3), in an even permutation that brings the facet to the front."""
+    fronts = np.concatenate([tets[:, even] for even in ([0, 1, 2, 3], [1, 0, 3, 2], [0, 2, 3, 1], [2, 1, 3, 0])])
+
+    def keys(corners):
+        return np.sort(corners, axis=1) @ np.array([2**42, 2**21, 1])
+
+    known = keys(fronts[:, :3])
+    order = np.argsort(known)
+    return fronts[order[np.searchsorted(known[order], keys(facets))]]
+
+
+def rules():
+    from basix import CellType, make_quadrature
+
+    from hifi.problem import PRESSURE_DEGREE, VOLUME_DEGREE
+
+    volume = make_quadrature(CellType.tetrahedron, VOLUME_DEGREE)
+    facet = make_quadrature(CellType.triangle, PRESSURE_DEGREE)
+    return {"volume_points": volume[0], "volume_weights": volume[1], "facet_points": facet[0], "facet_weights": facet[1]}
