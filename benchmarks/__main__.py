@@ -13,16 +13,19 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import chain
+from benchmarks import chain, speed
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"
-#: part -> (function returning {key: number}, what it needs and measures)
+#: part -> (function returning {key: number}, or that and details for the meta data; what it needs and measures)
 PARTS = {
     "setup": (chain.setup, "set-up on a fresh Debian 13 root, taken when the container image is built (make image)"),
     "ranks": (chain.ranks, "largest relative difference between the reference case on 1 and on 2 ranks"),
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
+    "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
+    "scaling": (speed.scaling, "seconds of assembly, factorisation and solution on three meshes, and their exponents"),
+    "ranks2": (speed.two_ranks, "two ranks against one at some 150k dofs"),
 }
 MEANING = {
     "setup_seconds": "fresh Debian 13 root to a working `.venv`: apt and PyPI downloads included, wall s",
@@ -32,6 +35,18 @@ MEANING = {
     "demo_fe_vs_target_rms_percent_of_length": "demo: FE centreline against the target, RMS paired by arc length, % of length",
     "demo_pressure_reached_kPa": "demo: pressure the FE solution reached, kPa",
     "rank_agreement_rel": "reference case, 1 against 2 ranks: largest difference relative to the larger of a result and 1 (0.01 for 1/mm)",
+    "ramp_ratio_same_strategy_h2": "ramp twist-w12 at h = 2 mm, same predictor and lagging: our time over the faster of FElupe and NGSolve",
+    "ramp_ratio_same_strategy_h1": "the same at h = 1 mm",
+    "ramp_ratio_frozen_h1": "that ramp at h = 1 mm: our own stepping's time over theirs with the prototype's predictor and lagging",
+    "ramp_ratio_stock_h2": "that ramp at h = 2 mm: our own stepping's time over theirs with full Newton and no predictor",
+    "ramp_factorisations_h1": "that ramp at h = 1 mm: factorisations of our own stepping",
+    "felupe_agreement_rel": "displacements at 50 kPa against FElupe on the same quadrature, h = 2 mm, relative 2-norm",
+    "ngsolve_agreement_rel": "displacements at 50 kPa against NGSolve, h = 2 mm, relative 2-norm",
+    "residual_exponent": "growth of a residual's time with the dofs (h = 2, 1.4, 1 mm)",
+    "tangent_exponent": "growth of a tangent's assembly time with the dofs",
+    "factorise_exponent": "growth of a factorisation's time with the dofs",
+    "solve_exponent": "growth of a solution's time with the dofs",
+    "ranks2_speedup_150k": "first steps of the ramp at some 150k dofs: time on 1 rank over time on 2 ranks",
 }
 
 
@@ -81,6 +96,7 @@ def snapshot():
         where = f"{m['machine']['processor']}, {m['machine']['cores']} cores"
         lines.append(f"| {part} | {m['date']} | {m['revision']} | {where} | {m['calibration_seconds']:.3f} |")
     write_text(ROOT / "docs" / "figures.md", "\n".join(lines) + "\n")
+    write_text(ROOT / "docs" / "speed.md", speed.page(results, meta))
 
 
 def main():
@@ -94,14 +110,15 @@ def main():
     for part in [a.only] if a.only else PARTS:
         print(f"bench: {part}", flush=True)
         loop = calibration()
-        figures = PARTS[part][0]()
+        found = PARTS[part][0]()
+        figures, details = found if isinstance(found, tuple) else (found, {})
         merge(OUT / "results.json", figures)
         facts = {
             "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
             "revision": revision(),
             "machine": machine(),
         }
-        merge(OUT / "results.meta.json", {part: {**facts, "calibration_seconds": loop, "keys": sorted(figures)}})
+        merge(OUT / "results.meta.json", {part: {**facts, "calibration_seconds": loop, "keys": sorted(figures), "details": details}})
         for key, value in figures.items():
             print(f"  {key} = {value:.6g}", flush=True)
 

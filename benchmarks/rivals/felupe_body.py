@@ -118,7 +118,8 @@ class FElupeBody(Body):
         """[(matrix, first column)]: K_uu and K_up of the solid, and the pressure's K_uu."""
         self._set_fields()
         uu, up = self.solid.assemble.matrix(self.field)[:2]
-        return [(uu, 0), (up, self.count_u), (self.pressure.assemble.matrix(self.field, pressure=self.pressure.assemble.multiplier * pressure), 0)]
+        load = self.pressure.assemble.matrix(self.field, pressure=self.pressure.assemble.multiplier * pressure)
+        return [(uu, 0), (up, self.count_u), (load, 0)]
 
     def _prepare_matrix(self):
         """Upper triangle without supported dofs, and for every block which entries go where."""

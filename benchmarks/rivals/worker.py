@@ -1,8 +1,9 @@
-"""One ramp in a process of its own: `python worker.py CODE STRATEGY MESH_FOLDER RESULT.npz [TOLERANCE]`.
+"""One measurement in a process of its own: `python worker.py CODE TASK MESH_FOLDER [RESULT.npz [TOLERANCE]]`.
 
+CODE: pneunet, felupe or ngsolve. TASK: a strategy of `ramp`, "operations", or for pneunet "best" (hifi's own stepping).
 Timed is the ramp: assembly, analysis and factorisation, solutions, updates. Not timed: imports, compilation, reading the
 mesh, spaces and sparsity patterns, one assembly to warm up. Prints one line of JSON; RESULT.npz holds points (n, 3) and
-displacements (n, 3) in mm at the last load.
+displacements (n, 3) in mm at the last load (of one rank).
 """
 
 import json
@@ -11,13 +12,14 @@ import time
 from pathlib import Path
 
 import numpy as np
+import ramp
 
 
-def make_body(code, folder):
+def make_body(code, task, folder):
     if code == "pneunet":
-        from our_body import OurBody
+        from our_body import BestBody, OurBody
 
-        return OurBody(folder / "manipulator.msh")
+        return (BestBody if task == "best" else OurBody)(folder / "manipulator.msh")
     mesh = dict(np.load(folder / "mesh.npz"))
     if code == "felupe":
         from felupe_body import FElupeBody
@@ -28,20 +30,17 @@ def make_body(code, folder):
     return NGSolveBody(mesh)
 
 
-def main(code, strategy, folder, result, tolerance=None):
-    from ramp import RELATIVE_TOLERANCE, STRATEGIES
-
-    body = make_body(code, Path(folder))
-    body.balance(0.0)
-    for name in body.seconds:
-        body.seconds[name] = 0.0
+def main(code, task, folder, result=None, tolerance=ramp.RELATIVE_TOLERANCE):
+    body = make_body(code, task, Path(folder))
+    body.warm_up()
     wall, cpu = time.perf_counter(), time.process_time()
-    steps = STRATEGIES[strategy](body, float(tolerance or RELATIVE_TOLERANCE))
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    points, displacements = body.displacements()
-    np.savez(result, points=points, displacements=displacements)
-    facts = {"seconds": wall, "cpu_seconds": cpu, "dofs": body.dofs, "factorisations": body.factorisations}
-    print(json.dumps(facts | {"iterations": sum(s[1] for s in steps), "steps": steps, "parts": body.seconds}))
+    facts = ramp.TASKS[task](body, float(tolerance))
+    facts |= {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu, "dofs": body.dofs}
+    if result:
+        points, displacements = body.displacements()
+        np.savez(result, points=points, displacements=displacements)
+    if body.speaks:
+        print(json.dumps(facts))
 
 
 if __name__ == "__main__":
