@@ -77,7 +77,8 @@ def owners(tets, facets):
 def rules():
     from basix import CellType, make_quadrature
 
-    from hifi.problem import PRESSURE_DEGREE, VOLUME_DEGREE
+    from hifi.loads import PRESSURE_DEGREE
+    from hifi.problem import VOLUME_DEGREE
 
     volume = make_quadrature(CellType.tetrahedron, VOLUME_DEGREE)
     facet = make_quadrature(CellType.triangle, PRESSURE_DEGREE)

@@ -1,6 +1,6 @@
 """The ramp's body in pneunet: the mixed problem of `hifi` and its direct solver; and hifi's own ramp.
 
-The only module of the rivals that knows hifi's inside.
+The only module of the rivals that knows hifi's inside (`meshes` knows its quadrature degrees).
 """
 
 import numpy as np
@@ -8,25 +8,26 @@ from mpi4py import MPI
 from ramp import MILESTONES, MPA, MU, Body
 
 from base.materials import NeoHookean
+from benchmarks.rivals.meshes import segment
 from geometry import cad
 from hifi import compat
+from hifi.loads import Pressure
 from hifi.manipulator import ManipulatorSolve
 from hifi.problem import MixedProblem, Support
 from hifi.solver import DirectSolver
 
 
 class OurBody(Body):
-    name = "pneunet"
+    """Plain displacement updates, no section frames, no secants: what the strategies of `ramp` say and no more."""
 
     def __init__(self, path, comm=MPI.COMM_WORLD):
         super().__init__()
-        self.problem = MixedProblem(*compat.read_mesh(path, comm), NeoHookean(MU), (cad.CAVITY, cad.CHANNEL), [Support(cad.BASE)])
-        self.dofs, self.fixed = self.problem.dofs, self.problem.fixed_dofs
+        self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
+        self.problem = MixedProblem(*compat.read_mesh(path, comm), NeoHookean(MU), [Support(cad.BASE)], [self.pressure])
+        self.dofs, self.speaks = self.problem.dofs, comm.rank == 0
         self.matrix = self.problem.create_tangent()
         self.solver = DirectSolver(self.matrix, comm)
-        self._right = self.matrix.createVecRight()
-        self.speaks = comm.rank == 0
-        self.problem.assemble_tangent(self.matrix, 0.0)
+        self.problem.assemble_tangent(self.matrix)
 
     @property
     def state(self):
@@ -38,21 +39,21 @@ class OurBody(Body):
 
     def balance(self, pressure):
         with self.timed("residual"):
-            residual, scale = self.problem.residual(pressure)
-            return residual.array.copy(), residual.norm(), scale
+            self.pressure.value.value = pressure
+            residual, scale = self.problem.residual()
+            return residual, np.sqrt(self.problem.mesh.comm.allreduce(residual @ residual)), scale
 
     def factorise(self, pressure):
         with self.timed("tangent"):
-            self.problem.assemble_tangent(self.matrix, pressure)
+            self.pressure.value.value = pressure
+            self.problem.assemble_tangent(self.matrix)
         with self.timed("factorise"):
             self.solver.factorise()
 
     def solve(self, right):
         with self.timed("solve"):
-            self._right.array[:] = right
-            solution = np.zeros(len(self.problem.array))
-            owned = self.solver.solve(self._right).array
-            solution[: len(owned)] = owned
+            solution = np.zeros(len(self.problem.array))  # ghosts follow when the state is set
+            solution[: len(right)] = self.solver.solve(right)
             return solution
 
     def displacements(self):
@@ -63,17 +64,16 @@ class BestBody:
     """hifi's own stepping, with everything that it measures at a step."""
 
     def __init__(self, path, comm=MPI.COMM_WORLD):
-        from benchmarks.rivals.meshes import segment
-
         self.solve = ManipulatorSolve(segment(), path, comm)
-        self.problem, self.newton = self.solve.problem, self.solve.newton
+        self.problem, self.newton = self.solve.problem, self.solve.path.newton
         self.dofs, self.speaks = self.problem.dofs, comm.rank == 0
 
     def warm_up(self):
         self.solve.measure()
-        self.problem.residual(0.0)
-        self.problem.load_force()
-        self.problem.assemble_tangent(self.newton.tangent, 0.0)
+        self.newton.residual()
+        matrix = self.problem.create_tangent()
+        self.problem.assemble_tangent(matrix)
+        matrix.destroy()
         self.newton.timings = dict.fromkeys(self.newton.timings, 0.0)
 
     def ramp(self, tolerance):
@@ -83,7 +83,7 @@ class BestBody:
 
     @property
     def factorisations(self):
-        return self.newton.solver.factorisations
+        return self.solve.system.factorisations
 
     @property
     def seconds(self):
