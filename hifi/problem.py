@@ -1,6 +1,6 @@
 """The mixed u-p boundary value problem: unknowns, residual, tangent.
 
-psi = W(F) + p (J - 1) with Taylor-Hood P2/P1, plus -P V for the pressure in a closed cavity, whose variation is the
+psi = W(F) + p (J - 1) - p^2/(2K) with Taylor-Hood P2/P1, plus -P V for the pressure in a closed cavity, whose variation is the
 follower load P inner(J inv(F).T N, v) on the cavity surface. Volume forms are integrated with degree 4 and pressure
 facets with degree 4, which is exact for the latter on straight-sided cells, so that the load tangent is symmetric.
 """
@@ -15,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from hifi import compat
-from hifi.materials import ENERGIES, PARAMETERS
+from hifi.materials import energy_density
 
 VOLUME_DEGREE = 4
 PRESSURE_DEGREE = 4
@@ -67,8 +67,8 @@ class MixedProblem:
         ds = ufl.Measure("ds", domain=mesh, subdomain_data=facet_tags, metadata={"quadrature_degree": PRESSURE_DEGREE})
         cavity = ds(tuple(pressure_tags) or (0,))  # gmsh numbers its tags from 1
         N = ufl.FacetNormal(mesh)
-        stored = self._stored_energy(F, cell_tags, materials, dx)
-        internal = ufl.derivative(stored + p * (J - 1) * dx, self.state, v)
+        stored = self._stored_energy(F, p, cell_tags, materials, dx)
+        internal = ufl.derivative(stored, self.state, v)
         # d(-V)/du: the load per unit of pressure
         load = ufl.inner(J * ufl.inv(F).T * N, ufl.split(v)[0]) * cavity
         X = ufl.SpatialCoordinate(mesh)
@@ -80,19 +80,15 @@ class MixedProblem:
         self.deformation_gradient = F
         self._vectors = {}
 
-    def _stored_energy(self, F, cell_tags, materials, dx):
+    def _stored_energy(self, F, p, cell_tags, materials, dx):
         if not isinstance(materials, dict):
-            return self._energy_density(materials, F) * dx
+            return energy_density(self.mesh, materials, F, p) * dx
         groups = {}
         for tag, material in materials.items():
             groups.setdefault(material, []).append(tag)
         if len(groups) == 1:
-            return self._energy_density(next(iter(groups)), F) * dx
-        return sum(self._energy_density(m, F) * dx(tuple(tags)) for m, tags in groups.items())
-
-    def _energy_density(self, material, F):
-        constants = {n: fem.Constant(self.mesh, PETSc.ScalarType(getattr(material, n))) for n in PARAMETERS[material.law]}
-        return ENERGIES[material.law](constants, F)
+            return energy_density(self.mesh, next(iter(groups)), F, p) * dx
+        return sum(energy_density(self.mesh, m, F, p) * dx(tuple(tags)) for m, tags in groups.items())
 
     def _support_condition(self, support):
         facets = self.facet_tags.find(support.tag)
