@@ -8,6 +8,8 @@ The J^(-2/3) form stays convex enough on thin walls where mu/2 (tr C - 3) with a
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
+from ufl.algorithms import extract_coefficients
+from ufl.algorithms.transformer import strip_variables
 
 from base.materials import LAWS
 
@@ -59,10 +61,9 @@ def _root(I1, I2):
     return a, b
 
 
-def ogden(c, F):
-    """Series in half powers of the principal stretches (base.halfpowers): traces of the powers of the fourth root of C."""
-    a, b = _root(*_root(*invariants(F)))
-    weights = c["half_power_weights"]
+def _half_powers(weights, I1, I2):
+    """Sum of the weighted traces (less 3) of the powers -n..n of the fourth root of a tensor with these invariants."""
+    a, b = _root(*_root(I1, I2))
     order = weights.ufl_shape[0] // 2
     energy = 0
     for offset, first, second in ((0, a, b), (order, b, a)):  # powers and inverse powers
@@ -70,6 +71,29 @@ def ogden(c, F):
         for n in range(3, order + 1):
             traces.append(first * traces[n - 1] - second * traces[n - 2] + traces[n - 3])
         energy += sum(weights[offset + n - 1] * (traces[n] - 3) for n in range(1, order + 1))
+    return energy
+
+
+def _frozen(F):
+    """F of functions that share their values with F's and are others to UFL: of the same value, with no derivative."""
+    functions = {f: fem.Function(f.function_space, f.x) for f in extract_coefficients(F)}
+    return ufl.replace(strip_variables(F), functions)
+
+
+def ogden(c, F):
+    """Series in half powers of the principal stretches (base.halfpowers).
+
+    Differentiating a long series twice by the displacement takes the form compiler minutes. The energy is therefore
+    written as its own Taylor polynomial in (I1, I2) about the current state: value, stress and tangent are exact there,
+    and the coefficients are plain numbers to the second derivative.
+    """
+    here = [ufl.variable(x) for x in invariants(_frozen(F))]
+    energy = _half_powers(c["half_power_weights"], *here)
+    slopes = [ufl.diff(energy, x) for x in here]
+    change = [x - x0 for x, x0 in zip(invariants(F), here)]
+    for i, slope in enumerate(slopes):
+        energy += slope * change[i]
+        energy += sum(ufl.diff(slope, x) * change[i] * change[j] / 2 for j, x in enumerate(here))
     return energy
 
 
