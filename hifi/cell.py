@@ -62,6 +62,7 @@ class CellProblem:
         J = ufl.det(F)
         energies = (
             (energy_density(mesh, material, F, p), solid),
+            *((energy_density(mesh, m, F, p), dx(cad.LAYER)) for m in [self.segment.layer_material] if m is not None),
             (-self.pressure * J + AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * J), air),
         )
         residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
@@ -88,7 +89,7 @@ class CellProblem:
             if len(low) != len(high) or distance.max() > 1e-5:
                 raise ValueError("the cell's mesh is not periodic")
             master[dofs[high]] = dofs[low[match]]
-        solid = self.cell_tags.indices[self.cell_tags.values == cad.BODY]
+        solid = self.cell_tags.indices[self.cell_tags.values != AIR]
         used = np.zeros(n, bool)
         used[self.displacement_dofs] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True

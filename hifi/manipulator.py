@@ -54,6 +54,7 @@ class ManipulatorSolve:
         if flip_y:
             mesh.geometry.x[:, 1] *= -1
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
+        materials |= {cad.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness}
         self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, (cad.CAVITY, cad.CHANNEL), [Support(cad.BASE)])
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
         coordinates = RodCoordinates(self.problem.nodes, self.problem.owned_nodes, comm, spacing)
