@@ -84,6 +84,7 @@ def stable_stretch(material, mode, largest=10.0):
         up, down = slopes(material, np.exp(e + shift)), slopes(material, np.exp(e - shift))
         change = (up - down) / (2 * step)
         hessian[:, :, j] = change[:, :2] - change[:, 2:]
-    trace, determinant = hessian[:, 0, 0] + hessian[:, 1, 1], np.linalg.det(hessian)
+    (a, b), (c, d) = hessian.transpose(1, 2, 0)
+    trace, determinant = a + d, a * d - b * c
     unstable = (trace <= 0) | (determinant <= 0)  # false where nan
     return float(l[np.argmax(unstable)]) if unstable.any() else np.inf
