@@ -6,7 +6,7 @@ import numpy as np
 
 from base.errors import InputError
 from base.files import atomic_path, output_directory, write_text
-from base.fitting import Tests, biaxial_spread, fit
+from base.fitting import TensileData, biaxial_spread, fit
 from base.hyperelastic import nominal_stress
 from base.materials import LAWS, material_to_table
 from base.tables import toml_text
@@ -28,7 +28,7 @@ def run_fit(path, law="all", directory=None, stress_unit=None, largest_strain=np
         raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
     specimens = read_tensile(path, stress_unit)
     try:
-        tests = Tests(specimens, largest_strain)
+        tests = TensileData(specimens, largest_strain)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     directory = output_directory(directory or Path("out") / f"fit-{path.stem}")

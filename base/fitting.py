@@ -35,7 +35,7 @@ class Fit:
     warnings: tuple
 
 
-class Tests:
+class TensileData:
     """What is fitted: all points of all specimens, thinned to at most 200 a specimen and weighted equally."""
 
     def __init__(self, specimens, largest_strain=np.inf):
@@ -67,6 +67,7 @@ class Tests:
             columns.append(self.weight * nominal_stress(unit, "uniaxial", self.stretch))
         scale = np.linalg.norm(columns, axis=1)
         values, residual = nnls((np.array(columns) / scale[:, None]).T, self.weight * self.stress)
+        values[values < 1e-6 * values.max()] = 0.0  # rounding, not a term
         found = dict.fromkeys(names, 0.0)
         for (name, sign), value in zip(signs, values / scale):
             found[name] += sign * float(value)
@@ -116,7 +117,7 @@ SEARCHES = {
 
 
 def fit(law, tests, **common):
-    """The Fit of one law to `Tests`; `common`: density, name and the like. InputError when no usable law comes out."""
+    """The Fit of one law to `TensileData`; `common`: density, name and the like. InputError when no usable law comes out."""
     parameters = {name: float(f"{value:.6g}") for name, value in SEARCHES[law](tests).items()}
     material = LAWS[law](**parameters, **common)
     return Fit(material, tests.error(material), tuple(_warnings(material, tests)))

@@ -30,21 +30,18 @@ class Specimen:
 def read_tensile(path, stress_unit=None):
     """List of Specimen; stress_unit ("kPa", ...) serves where the header names none. InputError for anything unclear."""
     rows = _rows(path)
-    for i, row in enumerate(rows):
-        pairs = _columns(row)
-        if pairs:
-            break
-    else:
+    top = next((i for i, row in enumerate(rows) if _columns(row)), None)
+    if top is None:
         raise InputError(f"{path}: no header with a strain (or stretch) and a stress column, as in 'strain_percent,stress_MPa'")
-    specimens = []
-    for strain_column, stress_column in pairs:
-        x = _numbers(rows[i + 1 :], strain_column, path) * (0.01 if _is_percent(row[strain_column]) else 1.0)
-        factor = _stress_factor(row[stress_column], stress_unit, path)
-        y = _numbers(rows[i + 1 :], stress_column, path) * factor
+    header, below, specimens = rows[top], rows[top + 1 :], []
+    for strain_column, stress_column in _columns(header):
+        name = header[strain_column]
+        x = _numbers(below, strain_column, path) * (0.01 if _is_percent(name) else 1.0)
+        y = _numbers(below, stress_column, path) * _stress_factor(header[stress_column], stress_unit, path)
         known = np.isfinite(x) & np.isfinite(y)
-        strain = x[known] - (1.0 if "stretch" in row[strain_column].lower() else 0.0)
+        strain = x[known] - (1.0 if "stretch" in name.lower() else 0.0)
         if len(strain) and strain.max() > LARGEST_STRAIN:
-            raise InputError(f"{path}: '{row[strain_column]}' reaches {strain.max():g}: if these are percent, name the column strain_percent")
+            raise InputError(f"{path}: '{name}' reaches {strain.max():g}: if these are percent, name the column strain_percent")
         specimens += _specimens(strain, y[known])
     if not specimens:
         raise InputError(f"{path}: fewer than 5 points of loading with strain and stress above 0")

@@ -44,6 +44,8 @@ class LoadPath:
         self.problem.set_array(self.problem.supported(self._predict(load), load))
         _, norm, scale = self.newton.residual(pressure)
         try:
+            if not np.isfinite(norm):
+                raise PredictorTooFar("the predicted state is beyond what the material's law allows")
             if not norm <= self._trusted * scale:
                 raise PredictorTooFar(f"the predicted state is off by {norm / scale:.1e} of the load")
             result = self.newton.solve(pressure)
