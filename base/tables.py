@@ -94,13 +94,18 @@ def from_table(cls, table, where, **preset):
 
 
 def to_table(instance):
-    """The TOML table of a dataclass instance: every field that carries a unit, in file units."""
+    """The TOML table of a dataclass instance: every field that carries a unit, in file units.
+
+    An infinite value means "none" or "not known" and is left out: the field's default brings it back.
+    """
     table = {}
     for field in dataclasses.fields(instance):
         if "unit" not in field.metadata:
             continue
         value = getattr(instance, field.name)
         if isinstance(value, float):
+            if math.isinf(value):
+                continue
             value = float(f"{value / TO_INTERNAL.get(field.metadata['unit'], 1.0):.12g}")
         table[file_key(field)] = value
     return table

@@ -20,6 +20,10 @@ def segment_table(manipulator):
     def row(label, value):
         return label, [value(s) for s in manipulator.segments]
 
+    layers = [
+        row("stiff layer, bottom of the base", lambda s: plain(s.layer_thickness) if s.layer_thickness else "-"),
+        row("its material", lambda s: s.layer_material.name if s.layer_thickness else "-"),
+    ]
     return [
         row("mode", segment_mode),
         row("angle to the axis, deg", lambda s: plain(s.angle)),
@@ -46,6 +50,7 @@ def segment_table(manipulator):
         row("length", lambda s: plain(s.length)),
         row("material", lambda s: s.material.name),
         row("shear modulus, MPa", lambda s: plain(s.material.mu, 4)),
+        *(layers if any(s.layer_thickness for s in manipulator.segments) else []),
     ]
 
 
@@ -122,7 +127,7 @@ def _frame(figure, design, height):
     )
     figure.text(x, y - 0.33 / height, facts, fontsize=10, color=INK, va="top")
     figure.text(1 - x, y, "all dimensions in mm", fontsize=10, color=INK, va="top", ha="right")
-    materials = {s.material.name: s.material for s in manipulator.segments}.values()
+    materials = {m.name: m for m in manipulator.materials}.values()
     told = "; ".join(f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials)
     notes = (
         f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The lower '

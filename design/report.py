@@ -252,7 +252,7 @@ def _walls(run, folder):
 def _drawing(run, folder):
     rows = segment_table(run.design.manipulator)
     table = _table(["segment", *[str(i + 1) for i in range(len(rows[0][1]))]], [[label, *values] for label, values in rows])
-    materials = {s.material.name: s.material for s in run.design.manipulator.segments}.values()
+    materials = {m.name: m for m in run.design.manipulator.materials}.values()
     told = _table(
         ["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],
         [[m.name, m.law, plain(m.mu, 4), plain(m.density * 1e12), m.source or "-"] for m in materials],

@@ -22,6 +22,7 @@ def section_groups(manipulator):
             s.side_wall,
             s.core_top,
             s.core_bottom,
+            s.layer_thickness,
             s.channel_width,
             s.channel_height,
             s.cavity_floor,
@@ -70,6 +71,8 @@ def cross_section(figure, rectangle, scale, manipulator, group):
         (s.channel_height / 2, s.core_top, f"roof {plain(s.roof)}"),
     ]
     below = "roof" if s.kind == TWISTING else "base"
+    if s.layer_thickness:
+        view.horizontal(-half, half, s.layer_top, s.layer_top, f"layer {plain(s.layer_thickness)}")
     core.insert(0, (s.core_bottom, -s.channel_height / 2, f"{below} {plain(-s.channel_height / 2 - s.core_bottom)}"))
     view.ladder(core, half, half + view.mm(0.2))
 

@@ -21,8 +21,9 @@ SHIPPED = Path(__file__).resolve().parent.parent / "examples" / "targets"
 POINT_COLUMNS = ("x_mm", "y_mm", "z_mm")
 FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
 
-#: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are found
-START_KEYS = {file_key(f): f.name for f in fields(Segment) if f.metadata.get("unit") == "mm"}
+#: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are found, and
+#: a bottom layer is no variable of the inverse design
+START_KEYS = {file_key(f): f.name for f in fields(Segment) if f.metadata.get("unit") == "mm" and f.name != "layer_thickness"}
 SHARED = ("width", "channel_width", "channel_height", "cavity_floor", "end_margin")
 VARY_KEYS = {"angle_deg": "angle"} | {key: name for key, name in START_KEYS.items() if name not in SHARED}
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from base.errors import InputError
 
-#: physical tags of the faces; volumes are tagged BODY + segment index
+#: physical tags of the faces; volumes are tagged BODY + segment index, bottom layers LAYER + segment index
 CAVITY, CHANNEL, BASE, TIP, OUTER = 11, 12, 13, 14, 15
-BODY = 100
+BODY, LAYER = 100, 300
 FACE_NAMES = {CAVITY: "cavity", CHANNEL: "channel", BASE: "base", TIP: "tip", OUTER: "outer"}
 
 _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
@@ -95,6 +95,16 @@ def cavity_solids(segment, start, channel_from, channel_to):
     return tags
 
 
+def layer_solid(segment, start, stop):
+    """[volume tag] of the bottom layer between two x (mm); empty when the segment has none."""
+    return [box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)] if segment.layer_thickness else []
+
+
+def pieces(children):
+    """Volumes among the children that OpenCASCADE's fragment reports of some of its arguments."""
+    return {v for family in children for v in family if v[0] == 3}
+
+
 def channel_range(manipulator):
     """x (mm) at which the channel begins and ends: half a pitch beyond the first and the last chamber, so that every
     chamber has its whole cell; what remains of the passive ends closes it."""
@@ -106,37 +116,41 @@ def channel_range(manipulator):
 
 
 def build(manipulator):
-    """Build the manipulator in the current gmsh model: one body volume per segment, tagged faces, one closed cavity.
+    """Build the manipulator in the current gmsh model: one body volume per segment (two with a bottom layer), tagged faces,
+    one closed cavity.
 
     Returns the CAD volumes {"body_mm3", "cavity_mm3"}. Raises InputError when the cavity is not one piece or a
     segment falls apart.
     """
     occ = gmsh.model.occ
     start_stop = channel_range(manipulator)
-    bodies, cavities = [], []
+    bodies, cavities, layers = [], [], []
     for segment, start in zip(manipulator.segments, manipulator.starts):
         bodies += fuse(outer_solids(segment, start), unify=True)
         cavities += [tag for tag in cavity_solids(segment, start, *start_stop)]
+        layers += [(3, tag) for tag in layer_solid(segment, start, start + segment.length)]
     # seams are kept: they separate the channel's wall from the chambers'
     cavities = fuse(cavities, unify=False)
-    _, parents = occ.fragment(bodies, cavities)
+    _, parents = occ.fragment(bodies, cavities + layers)
     occ.synchronize()
-    cavity_volumes = sorted({v for children in parents[len(bodies) :] for v in children if v[0] == 3})
-    body_volumes = sorted({v for children in parents[: len(bodies)] for v in children if v[0] == 3} - set(cavity_volumes))
+    inner = len(bodies) + len(cavities)
+    cavity_volumes, layer_volumes = sorted(pieces(parents[len(bodies) : inner])), sorted(pieces(parents[inner:]))
+    body_volumes = sorted(pieces(parents[: len(bodies)]) - set(cavity_volumes))
     volumes = {
         "body_mm3": sum(occ.getMass(*v) for v in body_volumes),
         "cavity_mm3": sum(occ.getMass(*v) for v in cavity_volumes),
     }
-    if len(body_volumes) != len(manipulator.segments):
+    if len(body_volumes) != len(manipulator.segments) + len(layers):
         raise InputError(
-            f"segment: the body falls into {len(body_volumes)} pieces instead of {len(manipulator.segments)}: "
+            f"segment: the body falls into {len(body_volumes)} pieces instead of {len(manipulator.segments) + len(layers)}: "
             "a wall is cut through by a cavity; check the wall and roof thicknesses"
         )
     cavity_faces = {abs(t) for _, t in gmsh.model.getBoundary(cavity_volumes, combined=True, oriented=True)}
     body_faces = {abs(t) for _, t in gmsh.model.getBoundary(body_volumes, combined=True, oriented=True)}
     if not cavity_faces <= body_faces:
         raise InputError("segment: the cavity breaks through the outer surface: check side_wall, top_wall and base_thickness")
-    _tag_volumes(manipulator, body_volumes)
+    _tag_volumes(BODY, "segment", range(len(manipulator.segments)), set(body_volumes) - set(layer_volumes))
+    _tag_volumes(LAYER, "layer of segment", [i for i, s in enumerate(manipulator.segments) if s.layer_thickness], layer_volumes)
     _tag_faces(manipulator, body_faces, cavity_faces)
     occ.remove(cavity_volumes)
     occ.synchronize()
@@ -151,11 +165,12 @@ def in_channel(segment, box):
     return in_y and in_z and x1 - x0 > 10 * _TOLERANCE
 
 
-def _tag_volumes(manipulator, body_volumes):
-    order = sorted(body_volumes, key=lambda v: gmsh.model.occ.getCenterOfMass(*v)[0])
-    for i, (_, tag) in enumerate(order):
-        gmsh.model.addPhysicalGroup(3, [tag], BODY + i)
-        gmsh.model.setPhysicalName(3, BODY + i, f"segment {i + 1}")
+def _tag_volumes(first, name, segments, volumes):
+    """Tag first + i for each segment index i; the volumes are told apart by their order along x."""
+    order = sorted(volumes, key=lambda v: gmsh.model.occ.getCenterOfMass(*v)[0])
+    for i, (_, tag) in zip(segments, order):
+        gmsh.model.addPhysicalGroup(3, [tag], first + i)
+        gmsh.model.setPhysicalName(3, first + i, f"{name} {i + 1}")
 
 
 def _tag_faces(manipulator, body_faces, cavity_faces):

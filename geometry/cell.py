@@ -56,11 +56,15 @@ def _build(segment, half, cut):
     for tags, unify in ((outer, True), (inner, False)):
         slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
         solids.append(occ.intersect(cad.fuse(tags, unify), [(3, slab)])[0])
-    _, parents = occ.fragment(*solids)
+    layer = [(3, tag) for tag in cad.layer_solid(s, -half, half)]
+    _, parents = occ.fragment(solids[0], solids[1] + layer)
     occ.synchronize()
-    air = sorted({t for children in parents[len(solids[0]) :] for d, t in children if d == 3})
-    body = sorted({t for children in parents[: len(solids[0])] for d, t in children if d == 3} - set(air))
-    gmsh.model.addPhysicalGroup(3, body, cad.BODY)
+    inner = len(solids[0]) + len(solids[1])
+    air, layer = ([t for _, t in sorted(cad.pieces(p))] for p in (parents[len(solids[0]) : inner], parents[inner:]))
+    body = sorted({t for _, t in cad.pieces(parents[: len(solids[0])])} - set(air))
+    gmsh.model.addPhysicalGroup(3, sorted(set(body) - set(layer)), cad.BODY)
+    if layer:
+        gmsh.model.addPhysicalGroup(3, layer, cad.LAYER)
     gmsh.model.addPhysicalGroup(3, air, AIR)
     _make_periodic(half, s.pitch)
     interface = _boundary(body) & _boundary(air)

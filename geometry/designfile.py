@@ -35,7 +35,7 @@ def read_design(path):
     data = read_toml(path)
     refuse_unknown(
         data,
-        ["schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "segment", "base", "result"],
+        ["schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "layer_material", "segment", "base", "result"],
         str(path),
     )
     if data.get("schema", SCHEMA) != SCHEMA:
@@ -50,6 +50,7 @@ def read_design(path):
     if not 0.1 <= mesh_size <= 20:
         raise InputError(f"{path}: mesh_size_mm = {mesh_size:g} must lie in 0.1..20 mm")
     material = material_from_table(data["material"], f"{path} [material]")
+    layer_material = material_from_table(data["layer_material"], f"{path} [layer_material]") if "layer_material" in data else None
     if not isinstance(data["segment"], list):
         raise InputError(f"{path}: segments are written [[segment]], with double brackets")
     segments = []
@@ -58,7 +59,11 @@ def read_design(path):
         row = as_table(row, where)
         own = row.pop("material", None)
         segment_material = material_from_table(own, f"{where} material") if own is not None else material
-        segments.append(from_table(Segment, row, where, material=segment_material))
+        own = row.pop("layer_material", None)
+        segment_layer = material_from_table(own, f"{where} layer_material") if own is not None else None
+        if segment_layer is None and row.get("layer_thickness_mm"):
+            segment_layer = layer_material
+        segments.append(from_table(Segment, row, where, material=segment_material, layer_material=segment_layer))
     try:
         manipulator = Manipulator(tuple(segments))
     except InputError as error:
@@ -92,13 +97,16 @@ def _base_pose(table, where):
 
 
 def design_tables(design):
-    """The nested tables of design.toml; a segment's material is written only where it differs from the first one's."""
+    """The nested tables of design.toml; a segment's material is written only where it differs from the first one's, a layer's
+    with every layer."""
     first = design.manipulator.segments[0].material
     rows = []
     for s in design.manipulator.segments:
         row = to_table(s)
         if s.material != first:
             row["material"] = material_to_table(s.material)
+        if s.layer_material is not None:
+            row["layer_material"] = material_to_table(s.layer_material)
         rows.append(row)
     tables = {
         "schema": SCHEMA,
@@ -118,7 +126,8 @@ def design_tables(design):
 
 def body_tables(manipulator):
     """What a solution belongs to: every dimension and material of every segment, in file units."""
-    return [{**to_table(s), "material": material_to_table(s.material)} for s in manipulator.segments]
+    layers = [{} if s.layer_material is None else {"layer_material": material_to_table(s.layer_material)} for s in manipulator.segments]
+    return [{**to_table(s), "material": material_to_table(s.material), **layer} for s, layer in zip(manipulator.segments, layers)]
 
 
 def write_design(path, design):

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from base.errors import InputError
-from base.materials import NeoHookean
+from base.materials import Hyperelastic, NeoHookean
 from base.tables import quantity
 
 ONE_SIDED, TWISTING = "one-sided", "twisting"
@@ -38,7 +38,9 @@ class Segment:
     channel_height: float = quantity("mm", 2.0, "air channel, z")
     cavity_floor: float = quantity("mm", 1.0, "z of the cavity's floor; at most half the channel height")
     end_margin: float = quantity("mm", 2.0, "bare core beyond the outermost corner of a chamber, each end")
-    material: NeoHookean = NeoHookean(mu=0.317)
+    layer_thickness: float = quantity("mm", 0.0, "stiff layer at the bottom of the base (one-sided); 0 = none")
+    material: Hyperelastic = NeoHookean(mu=0.317)
+    layer_material: Hyperelastic | None = None
 
     def __post_init__(self):
         if self.kind not in KINDS:
@@ -66,6 +68,7 @@ class Segment:
                 raise InputError(f"{name}_mm = {value:g} must be larger than 0")
             if not 0.05 <= value <= 500:
                 raise InputError(f"{name}_mm = {value:g} is not a castable size (0.05..500 mm): is it in metres?")
+        self._check_layer()
         if 2 * self.side_wall >= self.width:
             raise InputError(f"side_wall_mm = {self.side_wall:g}: two side walls do not fit into width_mm = {self.width:g}")
         if self.channel_width > self.cavity_width:
@@ -91,6 +94,23 @@ class Segment:
             )
         if self.length > 2000:
             raise InputError(f"chambers = {self.chambers}: the segment would be {self.length:.0f} mm long (at most 2000)")
+
+    def _check_layer(self):
+        if not self.layer_thickness:
+            if self.layer_material is not None:
+                raise InputError("layer_thickness_mm is missing or 0, but there is a layer material: give the layer's thickness")
+            return
+        if self.kind == TWISTING:
+            raise InputError(f"layer_thickness_mm = {self.layer_thickness:g}: only a one-sided segment has a bottom layer")
+        if not 0.05 <= self.layer_thickness <= self.base_thickness - 0.05:
+            raise InputError(
+                f"layer_thickness_mm = {self.layer_thickness:g} must lie in 0.05..{self.base_thickness - 0.05:g}: "
+                f"the layer is part of base_thickness_mm = {self.base_thickness:g}"
+            )
+        if self.layer_material is None:
+            raise InputError(
+                f"layer_thickness_mm = {self.layer_thickness:g} needs a material: write [layer_material] or [segment.layer_material]"
+            )
 
     @property
     def key(self):
@@ -132,6 +152,11 @@ class Segment:
     @property
     def core_bottom(self):
         return -self.core_top if self.kind == TWISTING else -self.channel_height / 2 - self.base_thickness
+
+    @property
+    def layer_top(self):
+        """z (mm) up to which the bottom layer's material reaches; core_bottom when there is none."""
+        return self.core_bottom + self.layer_thickness
 
     @property
     def cavity_top(self):
@@ -212,6 +237,11 @@ class Manipulator:
         for i, s in enumerate(self.segments):
             out += [(None, s.end_length), (i, s.active_length), (None, s.end_length)]
         return out
+
+    @property
+    def materials(self):
+        """Every material of the body once, layers included."""
+        return tuple(dict.fromkeys(m for s in self.segments for m in (s.material, s.layer_material) if m is not None))
 
     @property
     def chambers(self):

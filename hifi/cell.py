@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from geometry import cad
 from geometry.cell import AIR
 from hifi import compat, surface
-from hifi.materials import ENERGIES, PARAMETERS
+from hifi.materials import energy_density
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
 DEGREE = 4
@@ -60,9 +60,9 @@ class CellProblem:
         stretch = ufl.as_vector([q[i] for i in range(3)]) + ufl.cross(ufl.as_vector([q[i] for i in range(3, 6)]), y)
         F = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]]) + ufl.outer(stretch, ufl.unit_vector(0, 3))
         J = ufl.det(F)
-        constants = {n: fem.Constant(mesh, PETSc.ScalarType(getattr(material, n))) for n in PARAMETERS[material.law]}
         energies = (
-            (ENERGIES[material.law](constants, F) + p * (J - 1), solid),
+            (energy_density(mesh, material, F, p), solid),
+            *((energy_density(mesh, m, F, p), dx(cad.LAYER)) for m in [self.segment.layer_material] if m is not None),
             (-self.pressure * J + AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * J), air),
         )
         residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
@@ -89,7 +89,7 @@ class CellProblem:
             if len(low) != len(high) or distance.max() > 1e-5:
                 raise ValueError("the cell's mesh is not periodic")
             master[dofs[high]] = dofs[low[match]]
-        solid = self.cell_tags.indices[self.cell_tags.values == cad.BODY]
+        solid = self.cell_tags.indices[self.cell_tags.values != AIR]
         used = np.zeros(n, bool)
         used[self.displacement_dofs] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True

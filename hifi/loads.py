@@ -3,7 +3,6 @@
 import numpy as np
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 from petsc4py import PETSc
 
 PRESSURE_DEGREE = 4
@@ -93,11 +92,3 @@ class EndLoad:
         self._even.value[:] = self.force / area
         self._centre.value[:] = centre
         self._spin.value[:] = np.linalg.solve(np.trace(second) * np.eye(3) - second, self.moment) if self.moment.any() else 0.0
-
-    def set(self, force, moment):
-        self.force, self.moment = np.asarray(force, float), np.asarray(moment, float)
-
-
-def total(comm, values):
-    """Sum of an array over all ranks."""
-    return comm.allreduce(values, op=MPI.SUM)

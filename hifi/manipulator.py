@@ -56,6 +56,7 @@ class ManipulatorSolve:
         if flip_y:
             mesh.geometry.x[:, 1] *= -1
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
+        materials |= {cad.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness}
         self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
         self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, [Support(cad.BASE)], [self.pressure])
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
@@ -74,7 +75,7 @@ class ManipulatorSolve:
         frames = self.sections.frames()
         return Measured(
             step=step.number if step else 0,
-            pressure=self.path.load,
+            pressure=self.path.parameter,
             iterations=step.iterations if step else 0,
             factorisations=step.factorisations if step else 0,
             seconds=step.seconds if step else 0.0,
@@ -98,7 +99,7 @@ class ManipulatorSolve:
         return run_steps(self.path, pressure, size, lambda step: on_measured(self.measure(step)))
 
     def destroy(self):
-        self.newton.destroy()
+        self.system.destroy()
 
 
 class ResultFiles:
@@ -171,8 +172,8 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
                 ranks=comm.size,
                 mesh_size_mm=facts["mesh_size_mm"],
                 wall_seconds=time.perf_counter() - started,
-                timings=solve.newton.timings,
-                newton=vars(solve.newton.options),
+                timings=solve.path.newton.timings,
+                newton=vars(solve.path.newton.options),
                 versions=versions(),
                 failed_attempts=[[load * KPA, why] for load, why in failures],
                 steps=history,

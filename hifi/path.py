@@ -58,6 +58,8 @@ class EquilibriumPath:
         system.state = system.at_supports(state)
         _, norm, scale = newton.residual()
         try:
+            if not np.isfinite(norm):
+                raise PredictorTooFar("the predicted state is beyond what the material's law allows")
             if not norm <= self._trusted * scale:
                 raise PredictorTooFar(f"the predicted state is off by {norm / scale:.1e} of the load")
             result = newton.solve(parameter)

@@ -1,6 +1,6 @@
 """The mixed u-p boundary value problem: unknowns, residual, tangent.
 
-psi = W(F) + p (J - 1) with Taylor-Hood P2/P1, plus the loads' terms (hifi.loads). Volume forms are integrated with
+psi = W(F) + p (J - 1) - p^2/(2K) with Taylor-Hood P2/P1, plus the loads' terms (hifi.loads). Volume forms are integrated with
 degree 4 and pressure facets with degree 4, which is exact for the latter on straight-sided cells, so that the tangent of
 the pressure in a closed cavity is symmetric.
 """
@@ -15,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from hifi import compat
-from hifi.materials import ENERGIES, PARAMETERS
+from hifi.materials import energy_density
 
 VOLUME_DEGREE = 4
 
@@ -64,12 +64,11 @@ class MixedProblem:
         self.symmetric = all(load.closed for load in self.loads)
 
         u, p = ufl.split(self.state)
-        v, q = ufl.split(ufl.TestFunction(self.space))
+        v, _ = ufl.split(ufl.TestFunction(self.space))
         F = ufl.Identity(3) + ufl.grad(u)
-        J = ufl.det(F)
         dx = ufl.Measure("dx", domain=mesh, subdomain_data=cell_tags, metadata={"quadrature_degree": VOLUME_DEGREE})
-        stored = self._stored_energy(F, cell_tags, materials, dx)
-        internal = ufl.derivative(stored + p * (J - 1) * dx, self.state, ufl.TestFunction(self.space))
+        stored = self._stored_energy(F, p, cell_tags, materials, dx)
+        internal = ufl.derivative(stored, self.state, ufl.TestFunction(self.space))
         terms = [(load, load.term(self, u, v)) for load in self.loads]
         external = [term for _, term in terms]
         if body_force is not None:
@@ -84,19 +83,15 @@ class MixedProblem:
         self.deformation_gradient = F
         self._vectors = {}
 
-    def _stored_energy(self, F, cell_tags, materials, dx):
+    def _stored_energy(self, F, p, cell_tags, materials, dx):
         if not isinstance(materials, dict):
-            return self._energy_density(materials, F) * dx
+            return energy_density(self.mesh, materials, F, p) * dx
         groups = {}
         for tag, material in materials.items():
             groups.setdefault(material, []).append(tag)
         if len(groups) == 1:
-            return self._energy_density(next(iter(groups)), F) * dx
-        return sum(self._energy_density(m, F) * dx(tuple(tags)) for m, tags in groups.items())
-
-    def _energy_density(self, material, F):
-        constants = {n: fem.Constant(self.mesh, PETSc.ScalarType(getattr(material, n))) for n in PARAMETERS[material.law]}
-        return ENERGIES[material.law](constants, F)
+            return energy_density(self.mesh, next(iter(groups)), F, p) * dx
+        return sum(energy_density(self.mesh, m, F, p) * dx(tuple(tags)) for m, tags in groups.items())
 
     def _support_condition(self, support):
         facets = self.facet_tags.find(support.tag)

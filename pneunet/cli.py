@@ -5,6 +5,7 @@ rank); anything else is a bug and shows its traceback.
 """
 
 import argparse
+import math
 import os
 import sys
 import time
@@ -55,6 +56,16 @@ def mesh_size(text):
     return value
 
 
+def strain_percent(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f"'{text}' must be a number larger than 0")
+    return value
+
+
 def parser():
     top = Parser(prog="pneunet", description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
@@ -93,6 +104,13 @@ def parser():
 
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
+
+    c = add("fit-material", run_fit_material, "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
+    c.add_argument("test", type=Path, metavar="TENSILE.csv")
+    c.add_argument("--law", default="all", help="neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them")
+    c.add_argument("--stress-unit", help="where the file names none: MPa, kPa, Pa, psi")
+    c.add_argument("--to-strain-percent", type=strain_percent, default=math.inf, metavar="200", help="fit no further than this")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/fit-NAME of the test")
 
     c = add("run", run_ranks, "start a pneunet command (or, after --, any program) on N MPI ranks")
     c.add_argument("-n", "--ranks", type=int, required=True)
@@ -150,6 +168,12 @@ def run_report(a):
     from design.report import write_report
 
     write_report(a.directory, say=say)
+
+
+def run_fit_material(a):
+    from base.fit_material import run_fit
+
+    run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100, say=say)
 
 
 def run_ranks(a):

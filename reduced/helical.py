@@ -71,7 +71,8 @@ class HelicalCell:
         rows, weights = [], []
         for fraction, part, top in ((share, 1 - share, s.cavity_floor), (1 - share, -share, s.core_top)):
             layers = [
-                (s.core_bottom, -half, s.width),
+                *([(s.core_bottom, s.layer_top, s.width * s.layer_material.mu / self.mu)] if s.layer_thickness else []),
+                (s.layer_top, -half, s.width),
                 (-half, min(half, top), s.width - s.channel_width),
                 (half, top, s.width),
             ]

@@ -8,9 +8,11 @@ channel runs one pitch per chamber, and through the joints from one segment's la
 
 from dataclasses import replace
 
+import gmsh
 import pytest
 
 from base.errors import InputError
+from base.materials import NeoHookean
 from geometry import Manipulator, Segment, cad
 from tests.cases import CASES
 
@@ -86,6 +88,23 @@ def test_a_manipulator_is_the_sum_of_its_segments_and_the_channel_through_the_jo
 def test_mirror_designs_have_equal_volumes(name):
     s = CASES[name](angle=50.0, chambers=3)
     assert built(s.mirrored, ONE_SIDED.mirrored) == pytest.approx(built(s, ONE_SIDED), rel=1e-9)
+
+
+def test_a_bottom_layer_is_a_volume_of_its_own_and_changes_no_other():
+    layered = replace(ONE_SIDED, layer_thickness=0.4, layer_material=NeoHookean(mu=50.0))
+    segments = (layered, TWISTING, replace(layered, angle=90.0, layer_thickness=0.7))
+    plain = (ONE_SIDED, TWISTING, replace(ONE_SIDED, angle=90.0))
+    with cad.session():
+        volumes = cad.build(Manipulator(segments))
+        parts = {
+            tag: sum(gmsh.model.occ.getMass(3, v) for v in gmsh.model.getEntitiesForPhysicalGroup(3, tag))
+            for _, tag in gmsh.model.getPhysicalGroups(3)
+        }
+    for tag, s in ((cad.LAYER, segments[0]), (cad.LAYER + 2, segments[2])):
+        assert parts[tag] == pytest.approx(s.length * s.width * s.layer_thickness)
+    assert sorted(parts) == [cad.BODY, cad.BODY + 1, cad.BODY + 2, cad.LAYER, cad.LAYER + 2]
+    assert sum(parts.values()) == pytest.approx(volumes["body_mm3"])
+    assert (volumes["body_mm3"], volumes["cavity_mm3"]) == pytest.approx(built(*plain))
 
 
 def spoilt(segment, **change):

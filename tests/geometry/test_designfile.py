@@ -5,7 +5,7 @@ import pytest
 
 from base import se3
 from base.errors import InputError
-from base.materials import NeoHookean
+from base.materials import Gent, NeoHookean
 from geometry import Manipulator, Segment
 from geometry.designfile import Design, read_design, write_design
 
@@ -15,7 +15,8 @@ DESIGN = Design(
         (
             Segment("twisting", 61.23456789, 3, cavity_floor=0.5, gap=2.0, material=MATERIAL),
             Segment("one-sided", 90.0, 4, end_margin=1.5, material=MATERIAL),
-            Segment("one-sided", 120.0, 1, material=NeoHookean(mu=0.5)),
+            Segment("one-sided", 120.0, 1, material=Gent(mu=0.5, jm=30.0, bulk_modulus=900.0, elongation_at_break=4.0)),
+            Segment("one-sided", 60.0, 1, layer_thickness=0.3, material=MATERIAL, layer_material=NeoHookean(mu=50.0, name="paper")),
         )
     ),
     0.0364,
@@ -57,6 +58,17 @@ def test_a_short_file_has_the_defaults(tmp_path):
     assert (design.base_pose == np.eye(4)).all()
 
 
+def test_a_layer_takes_its_own_material_or_the_common_one(tmp_path):
+    path = tmp_path / "layers.toml"
+    layer = "\nlayer_thickness_mm = 0.5\n"
+    own = "[segment.layer_material]\nmu_MPa = 70\n"
+    segment = MINIMAL[MINIMAL.index("[[segment]]") :].rstrip()
+    path.write_text(f"{MINIMAL.rstrip()}{layer}{segment}{layer}{own}{segment}\n[layer_material]\nmu_MPa = 50\n")
+    segments = read_design(path).manipulator.segments
+    assert [s.layer_material and s.layer_material.mu for s in segments] == [50.0, 70.0, None]
+    assert [s.layer_thickness for s in segments] == [0.5, 0.5, 0.0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -75,6 +87,8 @@ def test_a_short_file_has_the_defaults(tmp_path):
         ("chambers = 3", "chambers = 0", r"\[\[segment\]\] 1: chambers = 0"),
         ("angle_deg", "angel_deg", r"\[\[segment\]\] 1: unknown key 'angel_deg': did you mean 'angle_deg'"),
         ("angle_deg = 60", "angle_rad = 1", r"\[\[segment\]\] 1: key 'angle_rad' has the wrong unit"),
+        ("chambers = 3", "chambers = 3\nlayer_thickness_mm = 0.5", r"\[\[segment\]\] 1: layer_thickness_mm = 0.5 needs a material"),
+        ("mu_MPa = 0.3", 'silicone = "Ecoflex"', r"\[material\]: silicone = 'Ecoflex' is not in the table: known are Ecoflex 00-10"),
         ("chambers = 3", 'chambers = 3\nmaterial = "soft"', r"\[\[segment\]\] 1 material: must be a table"),
         ("chambers = 3", "chambers = 3\n[base]\norigin_mm = [1, 2]", r"\[base\]: 'origin_mm' must be numbers"),
         ("chambers = 3", "chambers = 3\n[base]\norigin_mm = [1, 2, nan]", r"\[base\]: 'origin_mm' must be numbers"),

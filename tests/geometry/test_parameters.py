@@ -11,6 +11,7 @@ from geometry import Manipulator, Segment
 from tests.cases import CASES
 
 ONE_SIDED, TWISTING = Segment("one-sided", 60.0, 3), Segment("twisting", 60.0, 3)
+PAPER = NeoHookean(mu=50.0, name="paper")
 
 
 @pytest.mark.parametrize(
@@ -32,6 +33,11 @@ ONE_SIDED, TWISTING = Segment("one-sided", 60.0, 3), Segment("twisting", 60.0, 3
         ({"cavity_floor": -1.2}, r"cavity_floor_mm = -1.2 must lie in -1\.\.1 "),
         ({"kind": "twisting", "cavity_floor": -0.2}, r"cavity_floor_mm = -0.2 must lie in 0\.\.1 "),
         ({"chamber_height": 0.5, "top_wall": 0.5}, "chamber_height_mm = 0.5: .* does not rise above the core"),
+        ({"layer_thickness": 0.5}, r"layer_thickness_mm = 0.5 needs a material: write \[layer_material\]"),
+        ({"layer_thickness": 2.0, "layer_material": PAPER}, r"layer_thickness_mm = 2 must lie in 0\.05\.\.1\.95: .* base_thickness_mm = 2"),
+        ({"layer_thickness": -0.5, "layer_material": PAPER}, "layer_thickness_mm = -0.5 must lie in"),
+        ({"layer_material": PAPER}, "layer_thickness_mm is missing or 0"),
+        ({"kind": "twisting", "layer_thickness": 0.5, "layer_material": PAPER}, "layer_thickness_mm = 0.5: only a one-sided segment"),
         ({"angle": 90.0, "gap": 4.0}, r"end_margin_mm = 2 .* at least 2\.5 mm is needed with gap_mm = 4"),
     ],
 )
@@ -96,6 +102,7 @@ def test_cells_are_the_same_whatever_the_ends_and_the_number(segment):
     assert segment.key == replace(segment, chambers=9, end_margin=20.0).key
     assert segment.key != replace(segment, wall=1.1).key
     assert segment.key != replace(segment, material=NeoHookean(mu=0.2)).key
+    assert segment.key != replace(segment, layer_thickness=0.5, layer_material=PAPER).key
 
 
 def test_manipulator_adds_up():

@@ -1,5 +1,7 @@
 """The screw-periodic unit cell. Serial by design: cells are spread over ranks, not split."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -60,6 +62,19 @@ def test_stiffness_is_symmetric_positive_and_the_slope_of_forces(one_sided, tmp_
     h = 0.05
     ahead, behind = (held(one_sided, path, 0.02, free + s * h * direction) for s in (1, -1))
     assert (ahead - behind) / (2 * h) == pytest.approx(K @ direction, rel=1e-4, abs=1e-4 * np.linalg.norm(K @ direction))
+
+
+def test_a_stiff_bottom_layer_keeps_its_length(one_sided, tmp_path):
+    path, z = tmp_path / "cell.msh", one_sided.core_bottom + 0.25
+    stretches = []
+    for mu in (0.2068, 20.68):
+        layered = replace(one_sided, layer_thickness=0.5, layer_material=NeoHookean(mu))
+        cell = solved(layered, path, 0.02)
+        strains = cell.state().strains
+        stretches.append(np.linalg.norm(strains.e + np.cross(strains.k, [0, 0, z])))
+        cell.destroy()
+    assert stretches[0] < 0.99  # the soft base is compressed by the bending
+    assert stretches[1] == pytest.approx(1.0, abs=2e-3)
 
 
 def test_twisting_cell_only_twists_and_the_cut_s_place_does_not_matter(tmp_path):

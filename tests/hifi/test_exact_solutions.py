@@ -6,24 +6,34 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from base.materials import NeoHookean
-from hifi.path import LoadPath
+from hifi.body import BodySystem
+from hifi.control import LoadControl
+from hifi.loads import Pressure
+from hifi.path import EquilibriumPath
 from hifi.problem import MixedProblem, Support
 from hifi.rod_coordinates import RodCoordinates
-from hifi.solver import Newton
 from hifi.stepping import StepSize, run_steps
 from tests.hifi import bodies
 
 SYMMETRY = [Support(bodies.PLANE_X, 0), Support(bodies.PLANE_Y, 1), Support(bodies.PLANE_Z, 2)]
 
 
-def follow(problem, loads, observe, pressure=lambda load: load, first=0.05):
-    """[observe() at each of the loads]"""
-    newton = Newton(problem, RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm))
-    path = LoadPath(newton, pressure)
+def follow(mesh, supports, loads, observe, cavity=(bodies.INNER,), first=0.05):
+    """[observe(problem) at each of the loads] of a body of mu = 1 MPa; the load is the pressure, or drives the supports."""
+    pressures = [Pressure(cavity)] if cavity else []
+    problem = MixedProblem(*mesh, NeoHookean(1.0), supports, pressures)
+    coordinates = RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm)
+
+    def apply(load):
+        for pressure in pressures:
+            pressure.value.value = load
+
+    system = BodySystem(problem, coordinates, apply)
     seen = {}
     size = StepSize(first, 1e-4, milestones=tuple(loads))
-    run_steps(path, loads[-1], size, lambda step: seen.update({step.load: observe()}))
-    newton.destroy()
+    path = EquilibriumPath(system, LoadControl())
+    run_steps(path, loads[-1], size, lambda step: seen.update({step.load: observe(problem)}))
+    system.destroy()
     return [seen[load] for load in loads]
 
 
@@ -38,9 +48,8 @@ def sphere_radius(P):
 
 def test_inflated_sphere(shared_directory):
     mesh = bodies.build(shared_directory, "sphere", 0.4, bodies.sphere_octant, bodies.sphere_faces)
-    problem = MixedProblem(*mesh, NeoHookean(1.0), (bodies.INNER,), SYMMETRY)
     loads = [0.1, 0.3, 0.5, 0.7]
-    radii = follow(problem, loads, lambda: (6 * problem.cavity_volume() / np.pi) ** (1 / 3))
+    radii = follow(mesh, SYMMETRY, loads, lambda problem: (6 * problem.cavity_volume() / np.pi) ** (1 / 3))
     # the exact formula itself against the tabulated values
     assert [sphere_radius(P) for P in loads] == pytest.approx([1.03041551, 1.10556673, 1.21288815, 1.40224705], abs=1e-8)
     assert radii == pytest.approx([sphere_radius(P) for P in loads], rel=1e-3)
@@ -66,12 +75,11 @@ def capped_tube(P):
 
 def test_capped_tube(shared_directory):
     mesh = bodies.build(shared_directory, "capsule", 0.5, bodies.capsule_octant, bodies.capsule_faces)
-    problem = MixedProblem(*mesh, NeoHookean(1.0), (bodies.INNER,), SYMMETRY)
-    X = problem.nodes[: problem.owned_nodes]
-    radius = np.hypot(X[:, 1], X[:, 2])
-    inner = np.flatnonzero((X[:, 0] < 1.0) & (radius < 1.001))
 
-    def middle():
+    def middle(problem):
+        X = problem.nodes[: problem.owned_nodes]
+        radius = np.hypot(X[:, 1], X[:, 2])
+        inner = np.flatnonzero((X[:, 0] < 1.0) & (radius < 1.001))
         rows = problem.mesh.comm.allgather((X[inner], problem.displacement()[inner]))
         Xs, us = (np.concatenate(part) for part in zip(*rows))
         a = np.hypot(Xs[:, 1] + us[:, 1], Xs[:, 2] + us[:, 2]).mean()
@@ -79,7 +87,7 @@ def test_capped_tube(shared_directory):
 
     assert list(capped_tube(0.3)) == pytest.approx([1.27865588, 1.01267626], abs=1e-7)
     loads = [0.1, 0.3]
-    for P, (a, stretch) in zip(loads, follow(problem, loads, middle)):
+    for P, (a, stretch) in zip(loads, follow(mesh, SYMMETRY, loads, middle)):
         assert [a, stretch] == pytest.approx(capped_tube(P), rel=1e-3)
 
 
@@ -96,11 +104,13 @@ def test_torsion_and_stretch_of_a_cylinder(shared_directory):
         return np.stack([lam * X[:, 0], y, z], axis=1) - X
 
     supports = [Support(bodies.PLANE_X, None, motion), Support(bodies.END, None, motion)]
-    problem = MixedProblem(*mesh, NeoHookean(1.0), (), supports)
-    [(force, moment)] = follow(problem, [1.0], lambda: problem.reaction(bodies.END, 0.0), pressure=lambda load: 0.0, first=0.2)
+
+    def observe(problem):
+        error = np.abs(problem.displacement() - motion(problem.nodes, 1.0)).max()
+        return *problem.reaction(bodies.END), problem.mesh.comm.allreduce(error, op=MPI.MAX)
+
+    [(force, moment, error)] = follow(mesh, supports, [1.0], observe, cavity=(), first=0.2)
     a2 = 1 / stretch
     assert moment[0] == pytest.approx(np.pi * twist / (2 * stretch), rel=1e-3)
     assert force[0] == pytest.approx(np.pi * a2 * (stretch**2 - 1 / stretch) - np.pi * twist**2 * a2**2 / 4, rel=2e-3)
-    exact = motion(problem.nodes, 1.0)
-    error = problem.mesh.comm.allreduce(np.abs(problem.displacement() - exact).max(), op=MPI.MAX)
     assert error < 2e-3

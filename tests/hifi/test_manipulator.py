@@ -133,7 +133,7 @@ def test_pressure_out_of_reach_keeps_what_converged(shared_directory):
     reached = []
     with pytest.raises(ConvergenceError, match="stopped at load"):
         solve.run(2.0, lambda m: reached.append(m.pressure))
-    assert reached and solve.path.load == reached[-1] < 2.0
+    assert reached and solve.path.parameter == reached[-1] < 2.0
     solve.destroy()
 
 

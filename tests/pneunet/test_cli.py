@@ -30,6 +30,7 @@ width_direction = [0.0, 1.0, 0.0]
 kind = "bending"
 length_mm = 25.0
 """
+COMMANDS = ("design", "shape", "mesh", "solve", "report", "fit-material", "run", "doctor")
 STEPS = [
     "step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
     "smallest_wall_distance_mm", "largest_stretch", "seconds",
@@ -70,11 +71,11 @@ def folder(tmp_path_factory):
 def test_help_names_every_command(program, tmp_path):
     done = subprocess.run([*program, "--help"], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0
-    for command in ("design", "shape", "mesh", "solve", "report", "run", "doctor"):
-        assert re.search(rf"^ +{command} ", done.stdout, re.M), command
+    for command in COMMANDS:
+        assert re.search(rf"^ +{command}\s", done.stdout, re.M), command
 
 
-@pytest.mark.parametrize("command", ["design", "shape", "mesh", "solve", "report", "run", "doctor"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_its_help(command, tmp_path):
     assert pneunet(command, "--help", cwd=tmp_path).startswith(f"usage: pneunet {command}")
 
@@ -231,3 +232,15 @@ def test_report_shows_target_prediction_and_solution(folder):
     assert len(pictures) >= 8 and page.count("data:image/png;base64,") == len(pictures)
     assert not re.search(r"(src|href)=\"(?!data:)", page) and str(folder) not in page
     assert "was asked for less than the design pressure" in page  # 10 of 40 kPa, and it says so
+
+
+def test_fit_material_as_typed(tmp_path):
+    """neo-Hookean data of 0.2 MPa: nominal stress 0.2 (l - 1/l^2)."""
+    l = np.linspace(1.05, 2.0, 20)
+    np.savetxt(tmp_path / "pull.csv", np.column_stack([100 * (l - 1), 200 * (l - l**-2)]), delimiter=",", comments="",
+               header="strain_percent,stress_kPa")  # fmt: skip
+    told = pneunet("fit-material", "pull.csv", "--law", "neo-hookean", cwd=tmp_path)
+    assert "mu_MPa = 0.2" in told and "warning: uniaxial data alone" in told
+    out = tmp_path / "out" / "fit-pull"
+    assert {p.name for p in out.iterdir()} == {"material.toml", "fit.png"}
+    assert (out / "material.toml").read_text().startswith('[material]\nlaw = "neo-Hookean"\nmu_MPa = 0.2\n')

@@ -1,0 +1,162 @@
+"""Laws of materials: what is refused, what files say, closed-form responses, the table of silicones."""
+
+import re
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from base.errors import InputError
+from base.hyperelastic import MODES, nominal_stress, shear_stress, stable_stretch
+from base.materials import Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh, material_from_table, material_to_table, silicone
+from base.silicones import BULLETINS
+
+LAWS = [
+    NeoHookean(0.3, elongation_at_break=4.0),
+    MooneyRivlin(0.12, 0.03, bulk_modulus=50.0),
+    Yeoh(0.1, -1e-3, 2e-4),
+    Gent(0.3, 20.0),
+    Ogden(0.2, 1.3, 0.004, 5.0, 0.03, -2.0),
+]
+
+
+def by_law(material):
+    return material.law
+
+
+@pytest.mark.parametrize("material", LAWS, ids=by_law)
+def test_a_law_reads_back_from_its_table(material):
+    table = material_to_table(material)
+    assert list(table)[1].startswith(material.parameters[0]) and inf not in table.values()
+    assert material_from_table(table, "file") == material
+
+
+def test_what_is_not_known_is_infinite_and_what_is_incompressible_has_no_compliance():
+    plain, known, compressible = LAWS[4], LAWS[0], LAWS[1]
+    assert (plain.break_stretch, plain.bulk_compliance) == (inf, 0.0)
+    assert known.break_stretch == 5.0 and material_to_table(known)["elongation_at_break_percent"] == 400.0
+    assert compressible.bulk_compliance == 0.02 and material_to_table(compressible)["bulk_modulus_MPa"] == 50.0
+
+
+@pytest.mark.parametrize("material", LAWS, ids=by_law)
+def test_initial_moduli(material):
+    """3 mu in tension, 6 mu in equibiaxial tension, 4 mu in pure shear, mu in simple shear."""
+    for mode, modulus in (("uniaxial", 3), ("equibiaxial", 6), ("pure shear", 4)):
+        slope = (nominal_stress(material, mode, 1 + 1e-4) - nominal_stress(material, mode, 1 - 1e-4)) / 2e-4
+        assert slope == pytest.approx(modulus * material.mu, rel=1e-5), mode
+    assert shear_stress(material, 1e-5) / 1e-5 == pytest.approx(material.mu, rel=1e-6)
+
+
+#: by hand at stretch 2: uniaxial I1 - 3 = 2, equibiaxial 81/16, pure shear and simple shear by 1.5: 9/4
+UNIAXIAL, EQUIBIAXIAL, SHEAR = 2 - 1 / 4, 2 - 1 / 32, 2 - 1 / 8
+
+
+@pytest.mark.parametrize(
+    ("material", "expected"),
+    [
+        (NeoHookean(0.4), (0.4 * UNIAXIAL, 0.4 * EQUIBIAXIAL, 0.4 * SHEAR, 0.4 * 1.5)),
+        (
+            MooneyRivlin(0.2, 0.1),
+            (2 * UNIAXIAL * (0.2 + 0.1 / 2), 2 * EQUIBIAXIAL * (0.2 + 0.1 * 4), 2 * SHEAR * 0.3, 2 * 1.5 * 0.3),
+        ),
+        (
+            Yeoh(0.2, 0.01, 0.001),
+            tuple(
+                2 * (0.2 + 0.02 * x + 0.003 * x * x) * kinematic
+                for kinematic, x in ((UNIAXIAL, 2), (EQUIBIAXIAL, 81 / 16), (SHEAR, 9 / 4), (1.5, 9 / 4))
+            ),
+        ),
+        (
+            Gent(0.4, 10.0),
+            (0.4 * UNIAXIAL / 0.8, 0.4 * EQUIBIAXIAL / (1 - 81 / 160), 0.4 * SHEAR / 0.775, 0.4 * 1.5 / 0.775),
+        ),
+        # alpha = 4: slopes mu/2 l^4
+        (Ogden(0.4, 4.0), (0.2 * (16 - 1 / 4) / 2, 0.2 * (16 - 1 / 256) / 2, 0.2 * (16 - 1 / 16) / 2, 0.2 * (16 - 1 / 16) / 2.5)),
+    ],
+    ids=lambda x: getattr(x, "law", None),
+)
+def test_responses_at_stretch_2(material, expected):
+    found = [nominal_stress(material, mode, 2.0) for mode in MODES] + [shear_stress(material, 1.5)]
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_stability():
+    for material in LAWS:
+        assert [stable_stretch(material, mode) for mode in MODES] == [inf] * 3
+    # simple case by hand: Mooney-Rivlin with c01 < 0 loses its stiffness in the free plane of equibiaxial stretch; see the sign
+    # of c10 + c01 l^2 that multiplies the only stiffness against in-plane shear
+    falling = MooneyRivlin(0.3, -0.03)
+    assert stable_stretch(falling, "equibiaxial") < np.sqrt(10) + 0.02
+    assert stable_stretch(Gent(0.3, 5.0), "uniaxial") == inf
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: MooneyRivlin(-0.5, 0.1), r"2 \(c10_MPa \+ c01_MPa\) = -0.8 must be larger than 0"),
+        (lambda: Yeoh(0.1, -0.5), "law = 'Yeoh': these parameters are unstable from stretch 1.1"),
+        (lambda: Gent(0.3, 0.0), "jm = 0 must lie in"),
+        (lambda: Ogden(0.3, 0.0), r"alpha1 = 0 must lie in -10\.\.10"),
+        (lambda: Ogden(0.3, 2.0, 0.1, 14.0), "alpha2 = 14 must lie in"),
+        (lambda: Ogden(0.3, 2.0, -0.4, 3.0), "mu1_MPa .* = -0.1 must be larger than 0"),
+        (lambda: NeoHookean(0.3, bulk_modulus=1.0), "bulk_modulus_MPa = 1 is less than 5 shear moduli"),
+        (lambda: NeoHookean(0.3, elongation_at_break=-1.0), "elongation_at_break_percent = -100 must be larger than 0"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused(build, message):
+    with pytest.raises(InputError, match=message) as error:
+        build()
+    assert "\n" not in str(error.value)
+
+
+def test_half_powers_are_ogden_s_terms():
+    """Stress slope l dW/dl and its slope for stretches 1/10..10, relative to the terms' size."""
+    l = np.geomspace(0.1, 10, 301)
+    for terms in (((0.2, 1.3), (0.004, 5.0), (0.03, -2.0)), ((0.3, 9.9),), ((0.1, -0.01),)):
+        mus, alphas = np.transpose(terms)
+        material = Ogden(*np.ravel(terms))
+        up, down = np.split(material.half_power_weights[:, None], 2)
+        half = np.arange(1, len(up) + 1)[:, None] / 2
+        size = (2 * mus[:, None] * l ** alphas[:, None]).sum(0)
+        slope = (half * (up * l**half - down * l**-half)).sum(0)
+        tangent = (half**2 * (up * l**half + down * l**-half)).sum(0)
+        assert (slope - (2 * mus / alphas) @ l ** alphas[:, None]) / size == pytest.approx(0, abs=1e-7)
+        assert tangent / size == pytest.approx(1, abs=1e-7)
+
+
+def test_silicones_of_the_table():
+    assert len(BULLETINS) >= 12
+    for name, (stress, elongation, _) in BULLETINS.items():
+        material = silicone(name)
+        # 100 % modulus: nominal stress at twice the length; 1 psi = 6.894757 kPa
+        assert nominal_stress(material, "uniaxial", 2.0) == pytest.approx(stress * 6.894757e-3, rel=1e-3)
+        assert material.break_stretch == pytest.approx(1 + elongation / 100)
+        assert 0.9e-9 < material.density < 1.4e-9 and "bulletin" in material.source
+    own = material_from_table({"silicone": "Ecoflex 00-30", "mu_MPa": 0.05}, "file")
+    assert own.mu == 0.05 and own.name == "Ecoflex 00-30"
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"silicone": "Ecoflex"}, "file: silicone = 'Ecoflex' is not in the table: known are Ecoflex 00-10, "),
+        ({"silicone": ["Ecoflex 00-30"]}, "file: silicone = "),
+        ({"silicone": "Ecoflex 00-30", "law": "Yeoh"}, "file: 'silicone' and 'law' exclude each other"),
+        ({"law": "Gent", "mu_MPa": 0.3}, "file: key 'jm' is missing"),
+        ({"law": "Yeoh", "c10_kPa": 0.3}, "file: key 'c10_kPa' has the wrong unit: write 'c10_MPa'"),
+        ({"mu_MPa": 0.3, "bulk_modulus_MPa": inf}, "file: 'bulk_modulus_MPa' must be a finite number"),
+    ],
+)
+def test_wrong_tables_are_named(table, message):
+    with pytest.raises(InputError, match=message):
+        material_from_table(table, "file")
+
+
+def test_the_table_in_the_docs_is_the_code_s():
+    text = (Path(__file__).parents[2] / "docs" / "materials.md").read_text()
+    rows = re.findall(r"^\| ([^|]+) \| (\d+) \| ([\d.]+) \| (\d+) \| (\d+) \|$", text, re.M)
+    wanted = []
+    for name, (stress, elongation, density) in BULLETINS.items():
+        wanted.append((name, str(stress), f"{silicone(name).mu:.4g}", str(elongation), str(round(1000 * density))))
+    assert rows == wanted
