@@ -98,6 +98,8 @@ class CellProblem:
         self.reduced[kept] = np.arange(len(kept))
         self.reduced = np.where(used, self.reduced[master], -1)
         self.unknowns = len(kept)
+        #: number of incompressibility multipliers: so many negative pivots has a stable tangent
+        self.constraints = int(np.count_nonzero(np.isin(kept, self.pressure_dofs)))
 
     def _define_gauge(self):
         """gauge (unknowns, 6) and gauge_strains (6, 6): the section frame's conditions are linear in u and (e, k).

@@ -102,6 +102,10 @@ def parser():
     c.add_argument("--no-fields", action="store_true", help="write no ParaView files")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
 
+    c = add("cell", run_cell, "one pitch of a long segment: strains, volume and rod stiffness over pressure, or at given strains")
+    c.add_argument("cell", type=Path, metavar="CELL.toml")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the file's folder")
+
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
 
@@ -162,6 +166,12 @@ def run_solve(a):
     last = solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say)
     if last.walls is not None:
         say(f"done: {last.pressure * 1e3:g} kPa; results in {design_folder(a) / 'solve'}")
+
+
+def run_cell(a):
+    from hifi.cell_run import run_cell as work
+
+    work(a.cell, a.output or a.cell.parent, say=say)
 
 
 def run_report(a):

@@ -9,7 +9,11 @@ from mpi4py import MPI
 from base.materials import NeoHookean
 from geometry.cell import mesh_cell
 from hifi.cell import CellProblem
-from hifi.cell_path import CellPath
+from hifi.cell_run import CellCase, solve_cell
+from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
+from hifi.control import LoadControl
+from hifi.newton import NewtonOptions
+from hifi.path import EquilibriumPath
 from hifi.stepping import StepSize, run_steps
 from tests.cases import CASES
 
@@ -17,19 +21,25 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are seria
 
 
 def solved(segment, path, pressure, cut=0.0, mesh_size=2.5):
+    """The cell at `pressure` (MPa), its strains free."""
     mesh_cell(segment, mesh_size, path, cut)
-    cell = CellPath(CellProblem(segment, path))
-    run_steps(cell, pressure, StepSize(first=0.005, smallest=1e-4))
-    return cell
+    system = CellSystem(CellProblem(segment, path))
+    follow(system, pressure, StepSize(first=0.005, smallest=1e-4))
+    return system
 
 
 def held(segment, path, pressure, strains):
-    """(force, moment) (6,) per section at prescribed strains (6,)."""
-    cell = CellPath(CellProblem(segment, path), fixed_strains=strains)
-    run_steps(cell, pressure, StepSize(first=0.005, smallest=1e-4))
-    state = cell.state()
-    cell.destroy()
+    """(force, moment) (6,) per section at prescribed strains (6,), on the mesh that is there."""
+    rest = np.eye(6)[0]
+    system = CellSystem(CellProblem(segment, path), np.ones(6, bool), (0.0, pressure), (rest, strains - rest))
+    follow(system, 1.0, StepSize(first=0.25, smallest=1e-3))
+    state = system.measure()
+    system.destroy()
     return np.concatenate([state.force, state.moment])
+
+
+def follow(system, target, size):
+    run_steps(EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)), target, size)
 
 
 @pytest.fixture
@@ -39,7 +49,7 @@ def one_sided():
 
 def test_free_state_has_the_segment_s_symmetry_and_no_force(one_sided, tmp_path):
     cell = solved(one_sided, tmp_path / "cell.msh", 0.02)
-    state = cell.state()
+    state = cell.measure()
     e, k = state.strains.e, state.strains.k
     size = np.linalg.norm(k)
     assert abs(k[2]) < 0.01 * size and abs(e[2]) < 0.01 * size * one_sided.pitch
@@ -52,7 +62,7 @@ def test_free_state_has_the_segment_s_symmetry_and_no_force(one_sided, tmp_path)
 def test_stiffness_is_symmetric_positive_and_the_slope_of_forces(one_sided, tmp_path):
     path = tmp_path / "cell.msh"
     cell = solved(one_sided, path, 0.02)
-    state = cell.state()
+    state = cell.measure()
     free = np.concatenate([state.strains.e, state.strains.k])
     K = state.stiffness
     assert abs(K - K.T).max() < 1e-8 * abs(K).max()
@@ -70,7 +80,7 @@ def test_a_stiff_bottom_layer_keeps_its_length(one_sided, tmp_path):
     for mu in (0.2068, 20.68):
         layered = replace(one_sided, layer_thickness=0.5, layer_material=NeoHookean(mu))
         cell = solved(layered, path, 0.02)
-        strains = cell.state().strains
+        strains = cell.measure().strains
         stretches.append(np.linalg.norm(strains.e + np.cross(strains.k, [0, 0, z])))
         cell.destroy()
     assert stretches[0] < 0.99  # the soft base is compressed by the bending
@@ -82,10 +92,37 @@ def test_twisting_cell_only_twists_and_the_cut_s_place_does_not_matter(tmp_path)
     twists = []
     for cut in (0.0, 1.3):
         cell = solved(segment, tmp_path / f"{cut}.msh", 0.02, cut)
-        state = cell.state()
+        state = cell.measure()
         k = state.strains.k
         assert np.abs(k[1:]).max() < 0.01 * abs(k[0])
         twists.append(k[0])
         cell.destroy()
     # two different meshes of the same body
     assert twists[1] == pytest.approx(twists[0], rel=0.03)
+
+
+def test_prescribed_curvature_leaves_the_other_strains_free(one_sided, tmp_path):
+    """Holding k2 alone: its moment is what it takes, all other forces vanish; at the free value that moment does too."""
+    path = tmp_path / "cell.msh"
+    free, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1), path)
+    change = 0.002
+    bent, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1, {4: free.strains.k[1] + change}), path)
+    assert bent.strains.k[1] == pytest.approx(free.strains.k[1] + change, abs=1e-12)
+    forces = np.concatenate([bent.force, bent.moment])
+    assert np.delete(forces, 4) == pytest.approx(np.zeros(5), abs=1e-6)
+    # the compliance of the free state predicts it to first order
+    assert forces[4] == pytest.approx(change / np.linalg.inv(free.stiffness)[4, 4], rel=0.05)
+
+
+def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
+    """The case `ballooning`, without a contact model: pressure rises to a limit near 47 kPa and falls beyond it."""
+    segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.208))
+    states = []
+    solve_cell(CellCase(segment, 0.05, 4.0, 12, control="volume", volume_factor=12.0), tmp_path / "cell.msh", states.append)
+    pressure, unstable = (np.array([getattr(s, name) for s in states]) for name in ("pressure", "unstable"))
+    top = int(pressure.argmax())
+    assert 0 < top < len(states) - 1
+    assert 0.042 < pressure[top] < 0.052
+    assert (np.diff(pressure[: top + 1]) > 0).all() and (np.diff(pressure[top:]) < 0).all()
+    # stable at fixed pressure before the limit, one unstable direction beyond it
+    assert (unstable[: top - 1] == 0).all() and (unstable[top + 2 :] == 1).all()
