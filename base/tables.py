@@ -52,7 +52,7 @@ def refuse_unknown(table, known, where):
     for key in as_table(table, where):
         if key in known:
             continue
-        same_quantity = [k for k in known if k.rsplit("_", 1)[0] == key.rsplit("_", 1)[0] or k.rsplit("_", 1)[0] == key]
+        same_quantity = [k for k in known if k.rsplit("_", 1)[0] == key.rsplit("_", 1)[0] or k.startswith(key + "_")]
         near = same_quantity or difflib.get_close_matches(key, known, n=1, cutoff=0.5)
         if same_quantity:
             raise InputError(f"{where}: key '{key}' has the wrong unit: write '{near[0]}'")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import chain, speed
+from benchmarks import cell, chain, speed
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"
@@ -23,6 +23,7 @@ PARTS = {
     "ranks": (chain.ranks, "largest relative difference between the reference case on 1 and on 2 ranks"),
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
+    "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
     "scaling": (speed.scaling, "seconds of assembly, factorisation and solution on three meshes, and their exponents"),
     "ranks2": (speed.two_ranks, "two ranks against one at some 150k dofs"),
@@ -35,6 +36,11 @@ MEANING = {
     "demo_fe_vs_target_rms_percent_of_length": "demo: FE centreline against the target, RMS paired by arc length, % of length",
     "demo_pressure_reached_kPa": "demo: pressure the FE solution reached, kPa",
     "rank_agreement_rel": "reference case, 1 against 2 ranks: largest difference relative to the larger of a result and 1 (0.01 for 1/mm)",
+    "cell_sweep_h2_cpu_seconds": "cell one-sided-w10, 60 deg, 0-50 kPa in 10 levels with their stiffness, h = 2 mm: CPU s, meshing included",
+    "cell_sweep_default_cpu_seconds": "the same at the default mesh size, 1.5 mm",
+    "cell_mesh_error_rel": "that cell at 1.5 mm: error of (e, k pitch) at 20 and 50 kPa against strains extrapolated from 1 and 0.8 mm",
+    "cell_stiffness_fd_rel": "that cell at 20 kPa, 2 mm: stiffness against central differences of forces, relative to roots of diagonals",
+    "cell_stiffness_refinement_rel": "that cell at 50 kPa: largest eigenvalue of K(0.8 mm)^-1 K(1 mm) - 1",
     "ramp_ratio_same_strategy_h2": "ramp twist-w12 at h = 2 mm, same predictor and lagging: our time over the faster of FElupe and NGSolve",
     "ramp_ratio_same_strategy_h1": "the same at h = 1 mm",
     "ramp_ratio_frozen_h1": "that ramp at h = 1 mm: our own stepping's time over theirs with the prototype's predictor and lagging",

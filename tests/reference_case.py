@@ -15,7 +15,7 @@ def numbers():
     """{name: number} of the converged state at 20 kPa; the same on all ranks (None for walls off rank 0)."""
     from geometry.designfile import read_design
     from hifi.manipulator import ManipulatorSolve
-    from hifi.solver import NewtonOptions
+    from hifi.newton import NewtonOptions
 
     design = read_design(DATA / "reference.toml")
     # two decades below what is compared

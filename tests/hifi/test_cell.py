@@ -1,15 +1,17 @@
 """The screw-periodic unit cell. Serial by design: cells are spread over ranks, not split."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from base.files import read_columns
 from base.materials import NeoHookean
 from geometry.cell import mesh_cell
 from hifi.cell import CellProblem
-from hifi.cell_run import CellCase, solve_cell
+from hifi.cell_run import CellCase, run_cell, solve_cell
 from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
 from hifi.control import LoadControl
 from hifi.newton import NewtonOptions
@@ -126,3 +128,17 @@ def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
     assert (np.diff(pressure[: top + 1]) > 0).all() and (np.diff(pressure[top:]) < 0).all()
     # stable at fixed pressure before the limit, one unstable direction beyond it
     assert (unstable[: top - 1] == 0).all() and (unstable[top + 2 :] == 1).all()
+
+
+def test_the_command_leaves_a_table_and_a_record(tmp_path):
+    (tmp_path / "cell.toml").write_text(
+        'pressure_kPa = 10\nmesh_size_mm = 2.5\nlevels = 2\n[material]\nmu_MPa = 0.2068\n[segment]\nkind = "one-sided"\nangle_deg = 60\n'
+    )
+    run_cell(tmp_path / "cell.toml", tmp_path, say=lambda text: None)
+    names = ["pressure_kPa", "e1", "k1_rad_per_mm", "k_norm_per_mm", "unstable_directions", "K11", "K44", "kirchhoff22"]
+    table = read_columns(tmp_path / "cell" / "cell.csv", names)
+    assert table[:, 0] == pytest.approx([0, 5, 10])
+    assert table[0, 1:4] == pytest.approx([1, 0, 0], abs=1e-12)
+    assert (np.diff(table[:, 1:4], axis=0) > 0).all() and (table[:, 4] == 0).all()
+    assert (table[:, 7] <= table[:, 6]).all()  # relaxing the shears only softens
+    assert json.loads((tmp_path / "cell" / "run.json").read_text())["mesh"]["cells"] > 100

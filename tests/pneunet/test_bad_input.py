@@ -248,3 +248,30 @@ def test_shapes_beyond_the_reduced_models_limit_keep_the_others(folder, capsys, 
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "no shape at 1900 kPa" in error and "kept in out/shape: 5 kPa" in error
     assert (folder / "out" / "shape" / "centrelines.csv").is_file()
+
+
+CELL = """pressure_kPa = 10
+mesh_size_mm = 3
+levels = 2
+[material]
+mu_MPa = 0.3
+[segment]
+kind = "one-sided"
+angle_deg = 60
+"""
+CELLS = {
+    "unit": ("pressure_kPa = 10", "pressure_MPa = 0.01", "write 'pressure_kPa'"),
+    "no pressure": ("pressure_kPa = 10\n", "", "'pressure_kPa' is missing"),
+    "control": ("levels = 2", "control = 'force'", "write 'pressure' or 'volume'"),
+    "levels": ("levels = 2", "levels = 2.5", "'levels' must be a whole number"),
+    "mesh": ("mesh_size_mm = 3", "mesh_size_mm = 0", "mesh_size_mm = 0 must lie in 0.1..20"),
+    "held": ("angle_deg = 60", "angle_deg = 60\n[held]\nk1 = 0.1", "k1_per_mm"),
+    "held and volume": ("levels = 2", "control = 'volume'\n[held]\nk1_per_mm = 0.1", "go with control = 'pressure'"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "message"), CELLS.values(), ids=CELLS)
+def test_cell(folder, capsys, old, new, message):
+    text = changed(CELL, old, new)
+    (folder / "cell.toml").write_text(text)
+    assert message in refused(capsys, folder, "cell", "cell.toml")
