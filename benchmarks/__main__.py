@@ -36,7 +36,7 @@ MEANING = {
     "demo_fe_vs_target_rms_percent_of_length": "demo: FE centreline against the target, RMS paired by arc length, % of length",
     "demo_pressure_reached_kPa": "demo: pressure the FE solution reached, kPa",
     "rank_agreement_rel": "reference case, 1 against 2 ranks: largest difference relative to the larger of a result and 1 (0.01 for 1/mm)",
-    "cell_sweep_h2_cpu_seconds": "cell one-sided-w10, 60 deg, 0-50 kPa in 10 levels with their stiffness, h = 2 mm: CPU s, meshing included",
+    "cell_sweep_h2_cpu_seconds": "cell one-sided-w10, 60 deg, 0-50 kPa, 10 levels with stiffness, h = 2 mm: CPU s, meshing included",
     "cell_sweep_default_cpu_seconds": "the same at the default mesh size, 1.5 mm",
     "cell_mesh_error_rel": "that cell at 1.5 mm: error of (e, k pitch) at 20 and 50 kPa against strains extrapolated from 1 and 0.8 mm",
     "cell_stiffness_fd_rel": "that cell at 20 kPa, 2 mm: stiffness against central differences of forces, relative to roots of diagonals",
