@@ -58,3 +58,22 @@ def test():
         start = time.perf_counter()
         subprocess.run(["make", "test"], cwd=ROOT, check=True, env={**os.environ, "XDG_CACHE_HOME": cache})
         return {"test_seconds": time.perf_counter() - start}
+
+
+def long_segment():
+    """Steps and factorisations of the case one-sided-long, 26 chambers at 60 degrees, 0-50 kPa, mesh 2 mm."""
+    from geometry import Manipulator
+    from geometry.mesh import mesh_manipulator
+    from hifi.manipulator import ManipulatorSolve
+    from tests.cases import CASES
+
+    body = Manipulator((CASES["one_sided_long"](angle=60.0, chambers=26),))
+    with tempfile.TemporaryDirectory() as folder:
+        mesh_manipulator(body, 2.0, folder)
+        solve = ManipulatorSolve(body, Path(folder) / "manipulator.msh")
+        start, result = time.perf_counter(), solve.run(0.05)
+        seconds = time.perf_counter() - start
+    figures = {"long_segment_steps": len(result.steps), "long_segment_factorisations": solve.system.factorisations}
+    details = {"dofs": solve.problem.dofs, "ranks": 1, "wall_seconds": seconds, "failed_attempts": len(result.failures)}
+    solve.destroy()
+    return figures, details

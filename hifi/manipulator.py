@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from base import se3
 from base.errors import ConvergenceError
 from base.files import output_directory, write_csv
 from base.record import write_record
@@ -27,6 +28,8 @@ from hifi.stretch import PrincipalStretch
 from hifi.walls import WallDistances
 
 KPA = 1e3  # kPa per MPa
+#: rad; Newton on slender bodies is limited by how far they turn in a step, not by how far they strain
+TURN_PER_STEP = 0.3
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,22 @@ class ManipulatorSolve:
             largest=0.05 * softest,
             milestones=tuple(milestones),
         )
-        return run_steps(self.path, pressure, size, lambda step: on_measured(self.measure(step)))
+        before = [self.path.parameter, self._relative_rotations(self.sections.frames())]
+
+        def keep(step):
+            measured = self.measure(step)
+            now = self._relative_rotations(measured.frames)
+            turn = np.linalg.norm(se3.log_rotation(np.swapaxes(before[1], -1, -2) @ now), axis=-1).sum()
+            size.largest = min(0.05 * softest, TURN_PER_STEP * (step.load - before[0]) / max(turn, 1e-12))
+            before[:] = [step.load, now]
+            on_measured(measured)
+
+        return run_steps(self.path, pressure, size, keep)
+
+    @staticmethod
+    def _relative_rotations(frames):
+        """(stations - 1, 3, 3) rotation of each section frame with respect to the one before."""
+        return np.swapaxes(frames[:-1, :3, :3], -1, -2) @ frames[1:, :3, :3]
 
     def destroy(self):
         self.system.destroy()

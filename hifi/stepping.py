@@ -68,6 +68,7 @@ def run_steps(path, target, size, on_step=lambda step: None):
     step, started = size.first, time.perf_counter()
     while milestones:
         remaining = milestones[0] - path.parameter
+        step = min(step, size.largest)  # which on_step may have changed
         # hit the milestone exactly, and never leave a sliver of a step before it
         load = milestones[0] if step > 0.999 * remaining else path.parameter + (step if step < 0.6 * remaining else remaining / 2)
         attempted = load - path.parameter
@@ -93,7 +94,7 @@ def run_steps(path, target, size, on_step=lambda step: None):
         if load == milestones[0]:
             milestones.pop(0)
         if iterations <= size.target_iterations:
-            step = min(max(step, attempted) * size.growth_factor, size.largest)
+            step = max(step, attempted) * size.growth_factor
         elif iterations > 2 * size.target_iterations:
             step = max(attempted * 0.7, size.smallest)
         on_step(accepted)
