@@ -81,3 +81,14 @@ def cylinder_faces(box):
     if box[3] < 1e-4:
         return PLANE_X
     return END if box[0] > 2 - 1e-4 else OUTER
+
+
+def strip(length, width, height):
+    """Straight strip along x, its axis in the middle of its section."""
+    return gmsh.model.occ.addBox(0, -width / 2, -height / 2, length, width, height)
+
+
+def strip_faces(box, length):
+    if box[3] < 1e-4:
+        return PLANE_X
+    return END if box[0] > length - 1e-4 else OUTER
