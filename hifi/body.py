@@ -80,6 +80,8 @@ class BodySystem:
     @property
     def unstable(self):
         """Directions in which the factorised state is unstable at fixed loads; None when the matrix is unsymmetric."""
+        if not self.factorisations:
+            return 0  # at rest
         negative = self.solver.negative_pivots
         return None if negative is None else negative - self.problem.constraints
 

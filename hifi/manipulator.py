@@ -34,7 +34,10 @@ TURN_PER_STEP = 0.3
 
 @dataclass(frozen=True)
 class Measured:
-    """One accepted state, the same on all ranks but for `walls` (rank 0 only). Pressure in MPa, lengths in mm."""
+    """One accepted state, the same on all ranks but for `walls` (rank 0 only). Pressure in MPa, lengths in mm.
+
+    unstable: unstable directions at fixed pressure of the tangent factorised last, in this step or before.
+    """
 
     step: int
     pressure: float
@@ -47,6 +50,7 @@ class Measured:
     frames: np.ndarray
     strains: object
     walls: np.ndarray | None
+    unstable: int
 
 
 class ManipulatorSolve:
@@ -88,6 +92,7 @@ class ManipulatorSolve:
             frames=frames,
             strains=self.sections.segment_strains(frames),
             walls=self.walls.distances(),
+            unstable=self.system.unstable,
         )
 
     def run(self, pressure, on_measured=lambda measured: None, milestones=(), first_step=None):
@@ -131,14 +136,15 @@ class ResultFiles:
         p = m.pressure * KPA
         nearest = float(m.walls.min()) if len(m.walls) else float("inf")
         tip = m.frames[-1, :3, 3]
-        self.steps.append([m.step, p, m.iterations, m.factorisations, m.volume, *tip, nearest, m.largest_stretch, m.seconds])
+        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip, nearest, m.largest_stretch, m.unstable, m.seconds]
+        self.steps.append(row)
         self.centrelines += [[m.step, p, s, *g[:3, 3]] for s, g in zip(m.stations, m.frames)]
         for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
             self.segments.append([m.step, p, i, *e, *k])
         write_csv(
             self.directory / "steps.csv",
             "step pressure_kPa iterations factorisations volume_mm3 tip_x_mm tip_y_mm tip_z_mm smallest_wall_distance_mm "
-            "largest_stretch seconds".split(),
+            "largest_stretch unstable_directions seconds".split(),
             self.steps,
         )
         write_csv(self.directory / "centrelines.csv", "step pressure_kPa s_mm x_mm y_mm z_mm".split(), self.centrelines)
@@ -174,6 +180,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
         f"solve: {facts['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size} rank{'s' * (comm.size > 1)}, "
         f"0..{pressure * KPA:g} kPa; set up in {time.perf_counter() - started:.1f} s"
     )
+    breaks_at = break_stretch(design.manipulator)
     last, history = [], []
 
     def record(status, failures=()):
@@ -190,6 +197,8 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
                 ranks=comm.size,
                 mesh_size_mm=facts["mesh_size_mm"],
                 wall_seconds=time.perf_counter() - started,
+                largest_stretch=last[0].largest_stretch,
+                stretch_at_break=breaks_at if np.isfinite(breaks_at) else None,
                 timings=solve.path.newton.timings,
                 newton=vars(solve.path.newton.options),
                 versions=versions(),
@@ -212,7 +221,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
         if comm.rank == 0:
             files.add(m)
             if m.step:
-                say(_progress(m, pressure))
+                say(_progress(m, pressure, breaks_at))
         record("running, or ended by force")
 
     keep(solve.measure())
@@ -249,11 +258,20 @@ def versions():
     }
 
 
-def _progress(m, target):
+def break_stretch(manipulator):
+    """Smallest stretch at which one of the manipulator's materials breaks; inf when none says."""
+    return min(material.break_stretch for material in manipulator.materials)
+
+
+def _progress(m, target, breaks_at):
     done = m.pressure / target
     eta = m.seconds / done * (1 - done)
     nearest = m.walls.min() if len(m.walls) else float("inf")
     warning = "  WALLS OVERLAP" if nearest < 0 else ""
+    if m.unstable:
+        warning += f"  UNSTABLE in {m.unstable}"
+    if m.largest_stretch > breaks_at:
+        warning += f"  BEYOND BREAK (stretch {breaks_at:.2f})"
     return (
         f"step {m.step:3d}  {m.pressure * KPA:7.2f} kPa  {m.iterations:2d} iterations  {m.factorisations} factorisations  "
         f"stretch {m.largest_stretch:.2f}  wall distance {nearest:.2f} mm  {m.seconds:6.1f} s  ETA {eta:5.0f} s{warning}"

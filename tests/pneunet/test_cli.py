@@ -33,7 +33,7 @@ length_mm = 25.0
 COMMANDS = ("design", "shape", "mesh", "solve", "report", "fit-material", "run", "doctor")
 STEPS = [
     "step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
-    "smallest_wall_distance_mm", "largest_stretch", "seconds",
+    "smallest_wall_distance_mm", "largest_stretch", "unstable_directions", "seconds",
 ]  # fmt: skip
 CENTRELINES = ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"]
 SEGMENTS = ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"]
@@ -158,6 +158,7 @@ def test_tables_of_a_solve_agree_with_each_other(folder):
         assert line[0, 2:] == pytest.approx(0.0, abs=1e-12)  # the base at the origin
         assert line[-1, 2] == pytest.approx(manipulator.length) and line[-1, 3:] == pytest.approx(tip)
     assert steps[0, 5:8] == pytest.approx([manipulator.length, 0, 0], abs=1e-9)
+    assert (steps[:, 10] == 0).all()  # stable
     assert steps[-1, 7] < -0.5  # it bends away from its chambers
     segments = table(out / "segments.csv", SEGMENTS)
     assert segments[:, 0] == pytest.approx(steps[:, 0]) and (segments[:, 2] == 1).all()
