@@ -48,7 +48,8 @@ mkdir "$scratch/context"
     tar --null -T - -cf -) | tar -C "$scratch/context" -xf -
 
 say "building with $tool on $base"
-previous="$("$tool" images -q "$image" | head -n 1)"
+# Empty on the first build: buildah ends with an error for an image that it does not know.
+previous="$("$tool" images -q "$image" 2>/dev/null | head -n 1 || true)"
 build_image "$base" "$scratch/context" "$image"
 # The image that lost its name to the new one; layers that the new one uses stay.
 if [ -n "$previous" ] && [ "$("$tool" images -q "$image" | head -n 1)" != "$previous" ]; then
