@@ -100,6 +100,7 @@ def parser():
     c.add_argument("--pressure-kPa", type=one_pressure, dest="pressure", help="default: the design's")
     c.add_argument("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     c.add_argument("--no-fields", action="store_true", help="write no ParaView files")
+    c.add_argument("--resume", action="store_true", help="go on from the last accepted step of a run that was ended, on any ranks")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
 
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
@@ -159,7 +160,7 @@ def run_solve(a):
     design = read_design(a.design)
     from hifi.manipulator import solve_design
 
-    last = solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say)
+    last = solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume)
     if last.walls is not None:
         say(f"done: {last.pressure * 1e3:g} kPa; results in {design_folder(a) / 'solve'}")
 
