@@ -9,25 +9,26 @@ import numpy as np
 from mpi4py import MPI
 
 from base import se3
-from base.errors import ConvergenceError
-from base.files import output_directory, write_csv
+from base.errors import ConvergenceError, InputError
+from base.files import output_directory
 from base.record import write_record
 from geometry import cad
 from geometry.designfile import body_tables
-from hifi import compat
+from hifi import checkpoint, compat
+from hifi.agreement import on_rank_0
 from hifi.body import BodySystem
 from hifi.control import LoadControl
 from hifi.loads import Pressure
 from hifi.output import FieldWriter
 from hifi.path import EquilibriumPath
 from hifi.problem import MixedProblem, Support
+from hifi.results import KPA, ResultFiles
 from hifi.rod_coordinates import RodCoordinates
 from hifi.sections import SectionFrames
 from hifi.stepping import StepSize, run_steps
 from hifi.stretch import PrincipalStretch
 from hifi.walls import WallDistances
 
-KPA = 1e3  # kPa per MPa
 #: rad; Newton on slender bodies is limited by how far they turn in a step, not by how far they strain
 TURN_PER_STEP = 0.3
 
@@ -73,6 +74,8 @@ class ManipulatorSolve:
         self.sections = SectionFrames(self.problem, manipulator)
         self.walls = WallDistances(self.problem, manipulator)
         self.stretch = PrincipalStretch(self.problem)
+        #: hifi.stepping.Step of the last accepted state
+        self.last_step = None
 
     def _apply(self, load):
         self.pressure.value.value = load
@@ -95,8 +98,11 @@ class ManipulatorSolve:
             unstable=self.system.unstable,
         )
 
-    def run(self, pressure, on_measured=lambda measured: None, milestones=(), first_step=None):
-        """Step to `pressure` (MPa); `on_measured` sees every accepted state. ConvergenceError when it stops short."""
+    def run(self, pressure, on_measured=lambda measured: None, milestones=(), first_step=None, before=None):
+        """Step to `pressure` (MPa); `on_measured` sees every accepted state. ConvergenceError when it stops short.
+
+        `before`: the Step that this run goes on from (hifi.checkpoint).
+        """
         softest = min(s.material.mu for s in self.manipulator.segments)
         size = StepSize(
             first=min(first_step or 0.01 * softest, pressure),
@@ -104,66 +110,37 @@ class ManipulatorSolve:
             largest=0.05 * softest,
             milestones=tuple(milestones),
         )
-        before = [self.path.parameter, self._relative_rotations(self.sections.frames())]
 
-        def keep(step):
-            measured = self.measure(step)
-            now = self._relative_rotations(measured.frames)
-            turn = np.linalg.norm(se3.log_rotation(np.swapaxes(before[1], -1, -2) @ now), axis=-1).sum()
-            size.largest = min(0.05 * softest, TURN_PER_STEP * (step.load - before[0]) / max(turn, 1e-12))
-            before[:] = [step.load, now]
-            on_measured(measured)
+        def limit():
+            if len(self.path.accepted) > 1:
+                size.largest = min(0.05 * softest, TURN_PER_STEP / self._turn_per_load(*self.path.accepted[-2:]))
 
-        return run_steps(self.path, pressure, size, keep)
+        def on_step(step):
+            self.last_step = step
+            limit()
+            on_measured(self.measure(step))
 
-    @staticmethod
-    def _relative_rotations(frames):
-        """(stations - 1, 3, 3) rotation of each section frame with respect to the one before."""
-        return np.swapaxes(frames[:-1, :3, :3], -1, -2) @ frames[1:, :3, :3]
+        limit()
+        return run_steps(self.path, pressure, size, on_step, before)
+
+    def _turn_per_load(self, first, second):
+        """Sum over the stations of how far each section turns against the one before, rad per MPa between two PathStates."""
+        relative = []
+        for accepted in (first, second):
+            rotations = self.sections.frames(accepted.state)[:, :3, :3]
+            relative.append(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
+        turn = np.linalg.norm(se3.log_rotation(np.swapaxes(relative[0], -1, -2) @ relative[1]), axis=-1).sum()
+        return max(turn, 1e-12) / (second.parameter - first.parameter)
 
     def destroy(self):
         self.system.destroy()
 
 
-class ResultFiles:
-    """CSV files of a run, rewritten whole after every accepted step so that a kill leaves them valid. Rank 0 only."""
-
-    def __init__(self, directory, gaps):
-        self.directory, self.gaps = Path(directory), gaps
-        self.steps, self.centrelines, self.segments = [], [], []
-
-    def add(self, m):
-        p = m.pressure * KPA
-        nearest = float(m.walls.min()) if len(m.walls) else float("inf")
-        tip = m.frames[-1, :3, 3]
-        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip, nearest, m.largest_stretch, m.unstable, m.seconds]
-        self.steps.append(row)
-        self.centrelines += [[m.step, p, s, *g[:3, 3]] for s, g in zip(m.stations, m.frames)]
-        for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
-            self.segments.append([m.step, p, i, *e, *k])
-        write_csv(
-            self.directory / "steps.csv",
-            "step pressure_kPa iterations factorisations volume_mm3 tip_x_mm tip_y_mm tip_z_mm smallest_wall_distance_mm "
-            "largest_stretch unstable_directions seconds".split(),
-            self.steps,
-        )
-        write_csv(self.directory / "centrelines.csv", "step pressure_kPa s_mm x_mm y_mm z_mm".split(), self.centrelines)
-        write_csv(
-            self.directory / "segments.csv",
-            "step pressure_kPa segment e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(),
-            self.segments,
-        )
-        write_csv(
-            self.directory / "walls.csv",
-            "segment side gap gap_mm distance_mm".split(),
-            [[*gap, d] for gap, d in zip(self.gaps, m.walls)],
-        )
-
-
-def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, comm=MPI.COMM_WORLD, say=print):
+def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, comm=MPI.COMM_WORLD, say=print, resume=False):
     """Mesh (if not there yet) and solve a geometry.designfile.Design; files in directory/mesh and directory/solve.
 
-    mesh_size in mm and pressure in MPa override the design's. Returns the last Measured. Raises InputError on bad
+    mesh_size in mm and pressure in MPa override the design's. `resume` goes on from directory/solve/checkpoint.npz, which
+    every accepted step leaves, on any number of ranks. Returns the last Measured. Raises InputError on bad
     input and ConvergenceError (with everything accepted on disk) when the pressure cannot be reached.
     """
     directory = Path(directory)
@@ -171,7 +148,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
     mesh_size = mesh_size or design.mesh_size
     say = say if comm.rank == 0 else (lambda text: None)
     started = time.perf_counter()
-    facts = _on_rank_0(comm, lambda: _prepare(design, directory, mesh_size, say))
+    facts, kept = on_rank_0(comm, lambda: _prepare(design, directory, mesh_size, pressure, resume, say))
     solve = ManipulatorSolve(design.manipulator, directory / "mesh" / "manipulator.msh", comm)
     out = directory / "solve"
     files = ResultFiles(out, solve.walls.gaps)
@@ -181,7 +158,19 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
         f"0..{pressure * KPA:g} kPa; set up in {time.perf_counter() - started:.1f} s"
     )
     breaks_at = break_stretch(design.manipulator)
-    last, history = [], []
+    body = body_tables(design.manipulator)
+    last, history, before = [], [], None
+    if kept:
+        before = solve.last_step = checkpoint.restore(kept, solve.path)
+        last[:] = [solve.measure(before)]
+        if before.load >= pressure:
+            say(f"complete: the run in {out} has reached {before.load * KPA:g} kPa; there is nothing to resume")
+            solve.destroy()
+            return last[0]
+        say(f"resumed after step {before.number} at {before.load * KPA:.4g} kPa")
+        history = _written(comm, out, lambda: (files.keep(before.number), files.history())[1])
+        if writer:
+            _written(comm, out, lambda: writer.keep([(row["step"], row["pressure_kPa"]) for row in history]))
 
     def record(status, failures=()):
         if comm.rank == 0:
@@ -190,7 +179,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
                 status=status,
                 pressure_kPa=pressure * KPA,
                 pressure_reached_kPa=last[0].pressure * KPA,
-                body=body_tables(design.manipulator),
+                body=body,
                 mesh=facts,
                 cells=facts["cells"],
                 dofs=solve.problem.dofs,
@@ -207,6 +196,12 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
             )
 
     def keep(m):
+        try:
+            write(m)
+        except OSError as error:
+            raise _unwritable(out, error) from None
+
+    def write(m):
         last[:] = [m]
         if writer:
             writer.write(m.step, m.pressure * KPA)
@@ -218,16 +213,17 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
                 "factorisations": m.factorisations,
             }
         )
-        if comm.rank == 0:
-            files.add(m)
-            if m.step:
+        on_rank_0(comm, lambda: (files.add(m), record("running, or ended by force")) and None)
+        if m.step:  # last: what a checkpoint refers to is on disk
+            checkpoint.save(out, solve.path, solve.last_step, body, mesh_size)
+            if comm.rank == 0:
                 say(_progress(m, pressure, breaks_at))
-        record("running, or ended by force")
 
-    keep(solve.measure())
+    if not before:
+        keep(solve.measure())
     status, failure, result = "reached the pressure asked for", None, None
     try:
-        result = solve.run(pressure, keep)
+        result = solve.run(pressure, keep, before=before)
     except KeyboardInterrupt:
         record("interrupted")
         say(f"interrupted at {last[0].pressure * KPA:.4g} kPa; the result up to there is in {out}")
@@ -235,7 +231,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
     except ConvergenceError as error:
         failure, result = error, error.result
         status = f"stopped at {last[0].pressure * KPA:.4g} kPa of {pressure * KPA:g} kPa: {result.reason}"
-    record(status, result.failures)
+    _written(comm, out, lambda: record(status, result.failures))
     solve.destroy()
     if failure:
         raise ConvergenceError(
@@ -278,29 +274,40 @@ def _progress(m, target, breaks_at):
     )
 
 
-def _prepare(design, directory, mesh_size, say):
+def _unwritable(out, error):
+    return InputError(
+        f"{out}: cannot be written to ({error.strerror or error}): make room there and go on with pneunet solve --resume"
+    )
+
+
+def _written(comm, out, work):
+    """on_rank_0 for work that writes in `out`."""
+    try:
+        return on_rank_0(comm, work)
+    except OSError as error:
+        raise _unwritable(out, error) from None
+
+
+def _prepare(design, directory, mesh_size, pressure, resume, say):
+    """(facts of the mesh, checkpoint to go on from or None); rank 0."""
+    out = output_directory(directory / "solve")
+    for old in out.glob(".*-????????.*"):
+        old.unlink()  # half a file of a killed run
+    kept = checkpoint.read(out, body_tables(design.manipulator), mesh_size, pressure) if resume else None
+    if resume and not kept:
+        say(f"no {checkpoint.NAME} in {out}: starting from the beginning")
+    if not kept:
+        for old in [*out.glob("step_*.vtu"), out / "solution.pvd", out / "run.json", out / checkpoint.NAME]:
+            old.unlink(missing_ok=True)  # of an earlier run, which may have had more steps
+    return _mesh(design, directory, mesh_size, say), kept
+
+
+def _mesh(design, directory, mesh_size, say):
     from geometry.mesh import mesh_manipulator, segment_tables
 
-    out = output_directory(directory / "solve")
-    for old in [*out.glob("step_*.vtu"), out / "solution.pvd", out / "run.json"]:
-        old.unlink(missing_ok=True)  # of an earlier run, which may have had more steps
     facts_path = directory / "mesh" / "mesh.json"
     if facts_path.exists() and (directory / "mesh" / "manipulator.msh").exists():
         facts = json.loads(facts_path.read_text())
         if facts.get("mesh_size_mm") == mesh_size and facts.get("segments") == segment_tables(design.manipulator):
             return facts
     return mesh_manipulator(design.manipulator, mesh_size, directory / "mesh", say)
-
-
-def _on_rank_0(comm, work):
-    """Run `work` on rank 0; its result, or its error, on all ranks."""
-    result, error = None, None
-    if comm.rank == 0:
-        try:
-            result = work()
-        except Exception as problem:  # agreed on by all ranks before anybody waits in a collective call
-            error = problem
-    result, error = comm.bcast((result, error), root=0)
-    if error is not None:
-        raise error
-    return result

@@ -49,6 +49,7 @@ class Newton:
         self.system, self.control = system, control
         self.options = options or NewtonOptions()
         self.current = False  # whether there is a factorisation to lag
+        self.factorised_at = None  # (state, load) of that factorisation
         self.timings = {"residual": 0.0, "factorise": 0.0, "solve": 0.0}
 
     def timed(self, name, function, *arguments):
@@ -60,7 +61,7 @@ class Newton:
 
     def factorise(self):
         self.timed("factorise", self.system.factorise)
-        self.current = True
+        self.current, self.factorised_at = True, (self.system.state.copy(), self.system.load)
 
     def residual(self):
         """(residual, its norm, norm of the forces it balances)."""

@@ -1,11 +1,13 @@
 """ParaView files: one .vtu per accepted step and a .pvd that lists those that are complete."""
 
+import errno
 from pathlib import Path
 
 import numpy as np
 
 from base.files import atomic_path, write_text
 from hifi import compat
+from hifi.agreement import on_rank_0
 from hifi.surface import EDGES
 
 QUADRATIC_TETRA = 24
@@ -30,6 +32,15 @@ class FieldWriter:
         self._points = self._gather(problem.nodes[: self._owned])
         self._listed = []
 
+    def keep(self, steps):
+        """List the files of an earlier run's `steps`, (number, pressure in kPa) each; rank 0's other files of steps go."""
+        names = [(pressure, f"step_{number:04d}.vtu") for number, pressure in steps]
+        self._listed = [(pressure, name) for pressure, name in names if (self.directory / name).exists()]
+        if self.comm.rank == 0:
+            self._list()
+            for old in set(self.directory.glob("step_*.vtu")) - {self.directory / name for _, name in names}:
+                old.unlink()
+
     def _gather(self, rows):
         parts = self.comm.gather(rows, root=0)
         return np.concatenate(parts) if self.comm.rank == 0 else None
@@ -53,8 +64,9 @@ class FieldWriter:
             "stretch": self.stretch.nodal()[: self._owned],
         }
         fields = {name: self._gather(values) for name, values in fields.items()}
-        if self.comm.rank != 0:
-            return
+        on_rank_0(self.comm, lambda: self._save(fields, number, pressure_kPa))
+
+    def _save(self, fields, number, pressure_kPa):
         import pyvista
 
         cells = np.hstack([np.full((len(self._cells), 1), 10), self._cells[:, TO_VTK]])
@@ -64,7 +76,12 @@ class FieldWriter:
         name = f"step_{number:04d}.vtu"
         with atomic_path(self.directory / name) as temporary:
             grid.save(str(temporary))
+            if b"</VTKFile>" not in temporary.read_bytes()[-40:]:  # VTK prints that the disk is full, and goes on
+                raise OSError(errno.EIO, "a ParaView file could not be written whole")
         self._listed.append((pressure_kPa, name))
+        self._list()
+
+    def _list(self):
         rows = "".join(f'  <DataSet timestep="{p:.9g}" part="0" file="{f}"/>\n' for p, f in self._listed)
         write_text(
             self.directory / "solution.pvd",

@@ -30,7 +30,7 @@ class EquilibriumPath:
         self.accepted = [PathState(start, system.load, system.state.copy())]
         self._tangent = None
         #: predicted residuals (relative to the load) above this failed before; a residual is 10x cheaper than a failure
-        self._trusted = np.inf
+        self.trusted = np.inf
 
     def _predict(self, parameter):
         system, known = self.system, self.accepted[-self.memory :]
@@ -46,6 +46,14 @@ class EquilibriumPath:
         system.load = sum(w * a.load for w, a in zip(weights, known))
         return system.extrapolated([a.state for a in known], weights)
 
+    def resume(self, accepted, trusted, factorised_at=None):
+        """Go on from the `accepted` PathStates of another run, lagging the tangent at `factorised_at` (state, load) as it did."""
+        self.accepted, self.trusted, self.parameter = list(accepted), trusted, accepted[-1].parameter
+        if factorised_at is not None:
+            self.system.state, self.system.load = factorised_at
+            self.newton.factorise()
+        self._back(accepted[-1])
+
     def _back(self, kept):
         self.system.state, self.system.load = kept.state, kept.load
 
@@ -60,16 +68,16 @@ class EquilibriumPath:
         try:
             if not np.isfinite(norm):
                 raise PredictorTooFar("the predicted state is beyond what the material's law allows")
-            if not norm <= self._trusted * scale:
+            if not norm <= self.trusted * scale:
                 raise PredictorTooFar(f"the predicted state is off by {norm / scale:.1e} of the load")
             result = newton.solve(parameter)
         except NotConverged as error:
             if not isinstance(error, PredictorTooFar):
-                self._trusted = 0.5 * norm / scale
+                self.trusted = 0.5 * norm / scale
                 newton.current = False
             self._back(self.accepted[-1])
             raise
-        self._trusted *= 1.1  # so that one bad spot does not slow the rest
+        self.trusted *= 1.1  # so that one bad spot does not slow the rest
         self.parameter = parameter
         self.control.accepted(parameter, system)
         self.accepted = self.accepted[-self.memory + 1 :] + [PathState(parameter, system.load, system.state.copy())]

@@ -25,7 +25,7 @@ class StepSize:
 
 @dataclass(frozen=True)
 class Step:
-    """One accepted step."""
+    """One accepted step; next_size is what the stepper tries after it."""
 
     number: int
     load: float
@@ -33,6 +33,7 @@ class Step:
     factorisations: int
     residual: float
     seconds: float
+    next_size: float
 
 
 @dataclass
@@ -56,16 +57,19 @@ def lagrange_coefficients(known, wanted):
     return weights
 
 
-def run_steps(path, target, size, on_step=lambda step: None):
+def run_steps(path, target, size, on_step=lambda step: None, before=None):
     """Drive `path` from its current load to `target`; return a StepResult.
 
     path.parameter, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
-    its last accepted state. `on_step(step)` is called after each accepted step (hooks write results there). Raises
+    its last accepted state. `on_step(step)` is called after each accepted step (hooks write results there).
+    `before`: the last Step of a run that this one continues; its numbers, seconds and step size go on. Raises
     ConvergenceError, with the StepResult as its `result`, when steps fall below size.smallest.
     """
     result = StepResult()
     milestones = sorted({m for m in size.milestones if path.parameter < m < target} | {target})
-    step, started = size.first, time.perf_counter()
+    step, number, started = size.first, 0, time.perf_counter()
+    if before:
+        step, number, started = before.next_size, before.number, started - before.seconds
     while milestones:
         remaining = milestones[0] - path.parameter
         step = min(step, size.largest)  # which on_step may have changed
@@ -89,13 +93,14 @@ def run_steps(path, target, size, on_step=lambda step: None):
                 failure.result = result
                 raise failure from None
             continue
-        accepted = Step(len(result.steps) + 1, load, iterations, factorisations, residual, time.perf_counter() - started)
-        result.steps.append(accepted)
         if load == milestones[0]:
             milestones.pop(0)
         if iterations <= size.target_iterations:
             step = max(step, attempted) * size.growth_factor
         elif iterations > 2 * size.target_iterations:
             step = max(attempted * 0.7, size.smallest)
+        number += 1
+        accepted = Step(number, load, iterations, factorisations, residual, time.perf_counter() - started, step)
+        result.steps.append(accepted)
         on_step(accepted)
     return result

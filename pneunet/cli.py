@@ -100,6 +100,7 @@ def parser():
     c.add_argument("--pressure-kPa", type=one_pressure, dest="pressure", help="default: the design's")
     c.add_argument("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     c.add_argument("--no-fields", action="store_true", help="write no ParaView files")
+    c.add_argument("--resume", action="store_true", help="go on from the last accepted step of a run that was ended, on any ranks")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
 
     c = add("cell", run_cell, "one pitch of a long segment: strains, volume and rod stiffness over pressure, or at given strains")
@@ -163,7 +164,7 @@ def run_solve(a):
     design = read_design(a.design)
     from hifi.manipulator import solve_design
 
-    last = solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say)
+    last = solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume)
     if last.walls is not None:
         say(f"done: {last.pressure * 1e3:g} kPa; results in {design_folder(a) / 'solve'}")
 

@@ -220,7 +220,7 @@ def test_two_ranks_give_the_same_result(folder):
 def test_solve_without_fields_writes_tables_alone(folder, tmp_path):
     design = folder / "run 1" / "design.toml"
     pneunet("solve", design, "--mesh-size-mm", "4", "--pressure-kPa", "1", "--no-fields", "-o", tmp_path, cwd=tmp_path)
-    names = {"steps.csv", "centrelines.csv", "segments.csv", "walls.csv", "run.json"}
+    names = {"steps.csv", "centrelines.csv", "segments.csv", "walls.csv", "run.json", "checkpoint.npz"}
     assert {p.name for p in (tmp_path / "solve").iterdir()} == names
 
 

@@ -1,0 +1,110 @@
+"""checkpoint.npz: the memory of an equilibrium path on disk, for a run that goes on after a kill on any number of ranks.
+
+It holds the accepted states that the predictor extrapolates and the state at which the lagged tangent was factorised, so
+that the run which goes on iterates as the killed one would have. Values are stored with the undeformed coordinates of
+their nodes, sorted by them: each rank finds its own.
+"""
+
+import json
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from scipy.spatial import cKDTree
+
+from base.errors import InputError
+from base.files import atomic_path
+from hifi.agreement import on_rank_0
+from hifi.path import PathState
+from hifi.stepping import Step
+
+NAME = "checkpoint.npz"
+#: mm; nodes of another mesh are further apart than this, and one that is moved by the rounding of its file is not
+NEAR = 1e-6
+
+
+def save(directory, path, step, body, mesh_size):
+    """Write the EquilibriumPath of a hifi.body.BodySystem after `step`; collective. OSError on all ranks."""
+    problem, newton = path.system.problem, path.newton
+    factorised = [newton.factorised_at] if newton.current else []
+    states = [a.state for a in path.accepted] + [state for state, _ in factorised]
+    content = {
+        "belongs_to": _identity(body, mesh_size),
+        "step": np.array(astuple(step), float),
+        "parameter": np.array([a.parameter for a in path.accepted]),
+        "load": np.array([a.load for a in path.accepted] + [load for _, load in factorised]),
+        "trusted": np.array(path.trusted),
+    }
+    for name, dofs, nodes, owned in _fields(problem):
+        X = _gather(problem.mesh.comm, nodes[:owned])
+        values = [_gather(problem.mesh.comm, state[dofs[:owned]]) for state in states]
+        if problem.mesh.comm.rank == 0:
+            order = np.lexsort(np.round(X, 6).T)
+            content |= {f"{name}_nodes": X[order], name: np.array(values)[:, order]}
+
+    def write():
+        with atomic_path(Path(directory) / NAME) as temporary:
+            np.savez(temporary, **content)
+
+    on_rank_0(problem.mesh.comm, write)
+
+
+def read(directory, body, mesh_size, pressure):
+    """{name: array} of the checkpoint in `directory`, None without one; InputError when it is another body's or pressure's."""
+    path = Path(directory) / NAME
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            content = dict(stored)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: cannot be read ({error}): solve without --resume") from None
+    theirs, ours = json.loads(str(content["belongs_to"])), json.loads(_identity(body, mesh_size))
+    if theirs["mesh_size_mm"] != ours["mesh_size_mm"]:
+        raise InputError(f"{path}: mesh_size_mm is {theirs['mesh_size_mm']:g} there: add --mesh-size-mm {theirs['mesh_size_mm']:g}")
+    if theirs != ours:
+        raise InputError(f"{path}: belongs to another body than the design's: solve without --resume")
+    reached = content["parameter"][-1]
+    if reached > pressure * (1 + 1e-12):
+        raise InputError(f"{path}: has passed pressure_kPa = {pressure * 1e3:g}, it stands at {reached * 1e3:g}: solve without --resume")
+    return content
+
+
+def restore(content, path):
+    """Put the EquilibriumPath where the checkpoint was written; its Step. Collective; InputError when the mesh is another."""
+    problem = path.system.problem
+    states = np.zeros((len(content["load"]), len(problem.array)))
+    furthest, sizes = 0.0, True
+    for name, dofs, nodes, owned in _fields(problem):
+        distance, index = cKDTree(content[f"{name}_nodes"]).query(nodes)
+        furthest = max(furthest, distance.max(initial=0.0))
+        sizes &= problem.mesh.comm.allreduce(owned, op=MPI.SUM) == len(content[f"{name}_nodes"])
+        states[:, dofs] = content[name][:, index]
+    furthest = problem.mesh.comm.allreduce(furthest, op=MPI.MAX)
+    if furthest > NEAR or not sizes:
+        raise InputError(f"{NAME}: belongs to another mesh (a node is {furthest:.1e} mm away): solve without --resume")
+    loads, parameters = content["load"].tolist(), content["parameter"].tolist()
+    accepted = [PathState(*each) for each in zip(parameters, loads, states)]
+    factorised_at = (states[-1], loads[-1]) if len(states) > len(accepted) else None
+    path.resume(accepted, float(content["trusted"]), factorised_at)
+    number, load, iterations, factorisations, *rest = content["step"].tolist()
+    return Step(int(number), load, int(iterations), int(factorisations), *rest)
+
+
+def _identity(body, mesh_size):
+    return json.dumps({"body": body, "mesh_size_mm": mesh_size}, default=float, sort_keys=True)
+
+
+def _fields(problem):
+    """(name, index into the state array, coordinates in mm, number of owned nodes) of both fields, ghosts included."""
+    space, dofs = problem.pressure_space, problem.pressure_dofs
+    return (
+        ("displacement_mm", problem.displacement_dofs, problem.nodes, problem.owned_nodes),
+        ("multiplier_MPa", dofs, space.tabulate_dof_coordinates()[: len(dofs)], space.dofmap.index_map.size_local),
+    )
+
+
+def _gather(comm, rows):
+    parts = comm.gather(rows, root=0)
+    return np.concatenate(parts) if comm.rank == 0 else None

@@ -1,0 +1,55 @@
+"""Tables of a solve: one row, or block of rows, for each accepted step."""
+
+from pathlib import Path
+
+from base.files import read_csv, write_csv
+
+KPA = 1e3  # kPa per MPa
+
+
+class ResultFiles:
+    """CSV files of a run, rewritten whole after every accepted step so that a kill leaves them valid. Rank 0 only."""
+
+    def __init__(self, directory, gaps):
+        self.directory, self.gaps = Path(directory), gaps
+        self.steps, self.centrelines, self.segments = [], [], []
+
+    def keep(self, last):
+        """Go on from an earlier run's files: its rows up to step `last`."""
+        for name in ("steps", "centrelines", "segments"):
+            rows = read_csv(self.directory / f"{name}.csv")[1]
+            setattr(self, name, [row for row in rows if int(row[0]) <= last])
+
+    def history(self):
+        """run.json's list of the steps kept."""
+        return [
+            {"step": int(row[0]), "pressure_kPa": float(row[1]), "iterations": int(row[2]), "factorisations": int(row[3])}
+            for row in self.steps
+        ]
+
+    def add(self, m):
+        p = m.pressure * KPA
+        nearest = float(m.walls.min()) if len(m.walls) else float("inf")
+        tip = m.frames[-1, :3, 3]
+        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip, nearest, m.largest_stretch, m.unstable, m.seconds]
+        self.steps.append(row)
+        self.centrelines += [[m.step, p, s, *g[:3, 3]] for s, g in zip(m.stations, m.frames)]
+        for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
+            self.segments.append([m.step, p, i, *e, *k])
+        write_csv(
+            self.directory / "steps.csv",
+            "step pressure_kPa iterations factorisations volume_mm3 tip_x_mm tip_y_mm tip_z_mm smallest_wall_distance_mm "
+            "largest_stretch unstable_directions seconds".split(),
+            self.steps,
+        )
+        write_csv(self.directory / "centrelines.csv", "step pressure_kPa s_mm x_mm y_mm z_mm".split(), self.centrelines)
+        write_csv(
+            self.directory / "segments.csv",
+            "step pressure_kPa segment e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(),
+            self.segments,
+        )
+        write_csv(
+            self.directory / "walls.csv",
+            "segment side gap gap_mm distance_mm".split(),
+            [[*gap, d] for gap, d in zip(self.gaps, m.walls)],
+        )

@@ -1,0 +1,110 @@
+"""`pneunet solve --resume` after real kills, on one and two ranks, and what happens when nothing more can be written."""
+
+import shutil
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from base.files import read_columns
+from tests.reference_case import DATA
+
+SOLVE = [sys.executable, "-m", "pneunet", "solve", str(DATA / "reference.toml"), "--pressure-kPa", "35"]
+TABLES = {
+    "steps.csv": "step pressure_kPa volume_mm3 tip_x_mm tip_y_mm tip_z_mm largest_stretch smallest_wall_distance_mm".split(),
+    "centrelines.csv": "step pressure_kPa s_mm x_mm y_mm z_mm".split(),
+    "segments.csv": "step pressure_kPa segment e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(),
+}
+
+
+def solve(folder, *options, ranks=1, limit=None):
+    command = [*SOLVE, "-o", str(folder), *options]
+    if ranks > 1:
+        command = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), "--", *command]
+    if limit:  # bytes a file may have: writing more fails as on a full disk
+        command = ["prlimit", f"--fsize={limit}", *command]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=DATA.parent.parent)
+
+
+def reached(folder):
+    """Step of the checkpoint, 0 without one."""
+    try:
+        with np.load(folder / "solve" / "checkpoint.npz") as stored:
+            return int(stored["step"][0])
+    except FileNotFoundError:
+        return 0
+
+
+def readable(folder):
+    """Pressures of solution.pvd, every file of which is read."""
+    pyvista = pytest.importorskip("pyvista")
+    listed = ElementTree.parse(folder / "solve" / "solution.pvd").findall(".//DataSet")
+    for each in listed:
+        assert np.isfinite(pyvista.read(folder / "solve" / each.get("file"))["displacement"]).all()
+    return [float(each.get("timestep")) for each in listed]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    done = solve(folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory, whole):
+    """A folder whose run was killed with SIGKILL after its second step."""
+    folder = tmp_path_factory.mktemp("killed")
+    shutil.copytree(whole / "mesh", folder / "mesh")
+    process = subprocess.Popen([*SOLVE, "-o", str(folder)], stdout=subprocess.DEVNULL, cwd=DATA.parent.parent)
+    deadline = time.monotonic() + 120
+    while reached(folder) < 2 and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    assert 2 <= reached(folder) < reached(whole)
+    return folder
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_killed_run_ends_at_the_same_result(whole, killed, tmp_path, ranks):
+    folder = tmp_path / "run"
+    shutil.copytree(killed, folder)
+    assert len(readable(folder)) >= 3
+    step = reached(folder)
+    done = solve(folder, "--resume", ranks=ranks)
+    assert done.returncode == 0, done.stderr
+    assert f"resumed after step {step}" in done.stdout and f"step {step:3d} " not in done.stdout
+    for name, columns in TABLES.items():
+        a, b = (read_columns(where / "solve" / name, columns) for where in (whole, folder))
+        assert b == pytest.approx(a, rel=1e-8, abs=1e-8), name
+    with np.load(whole / "solve" / "checkpoint.npz") as a, np.load(folder / "solve" / "checkpoint.npz") as b:
+        last = len(a["parameter"]) - 1
+        print("difference", abs(a["displacement_mm"][last] - b["displacement_mm"][last]).max())
+        assert abs(a["displacement_mm"][last] - b["displacement_mm"][last]).max() < 1e-8 * abs(a["displacement_mm"][last]).max()
+    assert readable(folder) == pytest.approx(readable(whole))
+
+
+def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(whole, folder)
+    assert "complete" in solve(folder, "--resume").stdout
+    for options, message in ((["--mesh-size-mm", "4"], "add --mesh-size-mm 3"), (["--pressure-kPa", "5"], "has passed")):
+        refused = solve(folder, "--resume", *options)
+        assert refused.returncode == 2 and message in refused.stderr and len(refused.stderr.splitlines()) == 1
+    (folder / "solve" / "checkpoint.npz").unlink()
+    assert "starting from the beginning" in solve(folder, "--resume", "--pressure-kPa", "1", "--no-fields").stdout
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_full_disk_ends_in_one_line(whole, tmp_path, ranks):
+    """Files may grow to 400 kB here, which is more than the tables need and less than a checkpoint."""
+    shutil.copytree(whole / "mesh", tmp_path / "mesh")
+    failed = solve(tmp_path, "--no-fields", ranks=ranks, limit=400_000)
+    assert failed.returncode == 2, failed.stdout + failed.stderr
+    assert failed.stderr.count("cannot be written to") == 1 and "--resume" in failed.stderr and "Traceback" not in failed.stderr
+    assert not list((tmp_path / "solve").glob(".*"))
