@@ -5,6 +5,7 @@ that the run which goes on iterates as the killed one would have. Values are sto
 their nodes, sorted by them: each rank finds its own.
 """
 
+import io
 import json
 from dataclasses import astuple
 from pathlib import Path
@@ -44,8 +45,10 @@ def save(directory, path, step, body, mesh_size):
             content |= {f"{name}_nodes": X[order], name: np.array(values)[:, order]}
 
     def write():
+        archive = io.BytesIO()  # a zip file on a full disk fails a second time, out of reach, when Python discards it
+        np.savez(archive, **content)
         with atomic_path(Path(directory) / NAME) as temporary:
-            np.savez(temporary, **content)
+            temporary.write_bytes(archive.getbuffer())
 
     on_rank_0(problem.mesh.comm, write)
 

@@ -1,11 +1,10 @@
 """ParaView files: one .vtu per accepted step and a .pvd that lists those that are complete."""
 
-import errno
 from pathlib import Path
 
 import numpy as np
 
-from base.files import atomic_path, write_text
+from base.files import write_text
 from hifi import compat
 from hifi.agreement import on_rank_0
 from hifi.surface import EDGES
@@ -68,16 +67,19 @@ class FieldWriter:
 
     def _save(self, fields, number, pressure_kPa):
         import pyvista
+        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
         cells = np.hstack([np.full((len(self._cells), 1), 10), self._cells[:, TO_VTK]])
         grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), QUADRATIC_TETRA, np.uint8), self._points)
         for name, values in fields.items():
             grid.point_data[name] = values.astype(np.float32)
         name = f"step_{number:04d}.vtu"
-        with atomic_path(self.directory / name) as temporary:
-            grid.save(str(temporary))
-            if b"</VTKFile>" not in temporary.read_bytes()[-40:]:  # VTK prints that the disk is full, and goes on
-                raise OSError(errno.EIO, "a ParaView file could not be written whole")
+        writer = vtkXMLUnstructuredGridWriter()
+        writer.SetInputData(grid)
+        writer.SetDataModeToBinary()
+        writer.WriteToOutputStringOn()  # VTK itself crashes on a full disk
+        writer.Write()
+        write_text(self.directory / name, writer.GetOutputString())
         self._listed.append((pressure_kPa, name))
         self._list()
 
