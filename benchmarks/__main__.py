@@ -6,7 +6,6 @@ how fast a fixed calibration loop ran. --snapshot copies both to docs/ and rewri
 
 import argparse
 import json
-import shutil
 import sys
 import time
 from pathlib import Path
@@ -21,6 +20,7 @@ OUT = ROOT / "out" / "bench"
 PARTS = {
     "setup": (chain.setup, "set-up on a fresh Debian 13 root, taken when the container image is built (make image)"),
     "ranks": (chain.ranks, "largest relative difference between the reference case on 1 and on 2 ranks"),
+    "resume": (chain.resume, "a run killed with SIGKILL and resumed on 2 ranks against a whole one"),
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
@@ -37,6 +37,7 @@ MEANING = {
     "demo_fe_vs_target_rms_percent_of_length": "demo: FE centreline against the target, RMS paired by arc length, % of length",
     "demo_pressure_reached_kPa": "demo: pressure the FE solution reached, kPa",
     "rank_agreement_rel": "reference case, 1 against 2 ranks: largest difference relative to the larger of a result and 1 (0.01 for 1/mm)",
+    "resume_agreement_rel": "reference case to 35 kPa, killed and resumed on 2 ranks: largest difference in displacement over the largest",
     "cell_sweep_h2_cpu_seconds": "cell one-sided-w10, 60 deg, 0-50 kPa, 10 levels with stiffness, h = 2 mm: CPU s, meshing included",
     "cell_sweep_default_cpu_seconds": "the same at the default mesh size, 1.5 mm",
     "cell_mesh_error_rel": "that cell at 1.5 mm: error of (e, k pitch) at 20 and 50 kPa against strains extrapolated from 1 and 0.8 mm",
@@ -91,12 +92,12 @@ def demo_picture():
 
 
 def snapshot():
-    """Copy the results to docs/, write the table of figures and the README's picture."""
-    demo_picture()
+    """Merge the results into docs/, parts not measured anew kept; write the table of figures and the README's picture."""
+    if (ROOT / "out" / "demo" / "report").is_dir():
+        demo_picture()
     for name in ("results.json", "results.meta.json"):
-        shutil.copyfile(OUT / name, ROOT / "docs" / name)
-    results = json.loads((OUT / "results.json").read_text())
-    meta = json.loads((OUT / "results.meta.json").read_text())
+        merge(ROOT / "docs" / name, json.loads((OUT / name).read_text()))
+    results, meta = (json.loads((ROOT / "docs" / name).read_text()) for name in ("results.json", "results.meta.json"))
     lines = ["# Figures", "", "Made by `make bench` and `python -m benchmarks --snapshot`; do not edit.", ""]
     lines += ["| key | value | what it is |", "|---|---|---|"]
     lines += [f"| `{key}` | {value:.4g} | {MEANING[key]} |" for key, value in sorted(results.items())]

@@ -30,6 +30,30 @@ def ranks():
     return {"rank_agreement_rel": reference_case.largest_difference(one, two)}
 
 
+def resume():
+    """Largest displacement difference, relative to the largest displacement, of a killed and resumed run from a whole one."""
+    import numpy as np
+
+    from tests.pneunet.test_resume import SOLVE, reached, solve
+
+    with tempfile.TemporaryDirectory() as folder:
+        whole, killed = Path(folder) / "whole", Path(folder) / "killed"
+        solve(whole, "--no-fields").check_returncode()
+        command = [sys.executable, "-m", "pneunet", *SOLVE, "-o", str(killed), "--no-fields"]
+        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL) as process:
+            while reached(killed) < 2 and process.poll() is None:
+                time.sleep(0.01)
+            process.kill()
+        step = reached(killed)
+        solve(killed, "--no-fields", "--resume", ranks=2).check_returncode()
+        ends = []
+        for each in (whole, killed):
+            with np.load(each / "solve" / "checkpoint.npz") as stored:
+                ends.append(stored["displacement_mm"][len(stored["parameter"]) - 1])
+    a, b = ends
+    return {"resume_agreement_rel": float(np.abs(a - b).max() / np.abs(a).max())}, {"killed_after_step": step}
+
+
 def demo():
     """`make demo` from an empty output folder."""
     import shutil
