@@ -25,7 +25,7 @@ class DirectSolver:
         pc.setFactorSetUpSolverType()
         self._solution, self._right = matrix.createVecs()
         factor = pc.getFactorMatrix()
-        factor.setMumpsIcntl(7, 5)  # metis: up to 5x better than the automatic choice on these matrices
+        factor.setMumpsIcntl(7, 5)  # metis, where this MUMPS has it; Debian 12 takes its own choice (PORD) all the same
         if symmetric:
             factor.setMumpsIcntl(12, 2)  # ordering of the graph compressed by 2x2 pivots: 7 % fewer operations
         factor.setMumpsIcntl(14, 60)  # workspace for pivoting, in percent
