@@ -1,4 +1,4 @@
-"""Commercial silicones: what their makers' technical bulletins say."""
+"""Commercial silicones, after their makers' technical bulletins (entered from memory, not compared with them since)."""
 
 from base.errors import InputError
 
@@ -38,5 +38,5 @@ def bulletin(name):
         "density_kg_per_m3": round(1000 * density),
         "elongation_at_break_percent": elongation,
         "name": name,
-        "source": f"manufacturer's technical bulletin; mu from its 100 % modulus, {stress} psi / 1.75",
+        "source": f"after the manufacturer's technical bulletin, from memory, not compared since; mu from its 100 % modulus, {stress} psi / 1.75",
     }
