@@ -38,5 +38,5 @@ def bulletin(name):
         "density_kg_per_m3": round(1000 * density),
         "elongation_at_break_percent": elongation,
         "name": name,
-        "source": f"after the manufacturer's technical bulletin, from memory, not compared since; mu from its 100 % modulus, {stress} psi / 1.75",
+        "source": f"technical bulletin, from memory, not compared since; mu from its 100 % modulus, {stress} psi / 1.75",
     }
