@@ -78,7 +78,7 @@ def read_cell(path):
 
 
 def solve_cell(case, mesh_path, on_state=lambda state: None):
-    """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns the last CellState.
+    """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns (last CellState, mesh facts).
 
     ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
     """
