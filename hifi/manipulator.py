@@ -29,8 +29,8 @@ from hifi.stepping import StepSize, run_steps
 from hifi.stretch import PrincipalStretch
 from hifi.walls import WallDistances
 
-#: rad; Newton on slender bodies is limited by how far they turn in a step, not by how far they strain
-TURN_PER_STEP = 0.3
+#: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how far they strain
+TURN_PER_STEP = 2.0
 
 
 @dataclass(frozen=True)

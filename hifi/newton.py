@@ -8,7 +8,9 @@ A *system* (hifi.body, hifi.cell_system) has a state (an array), a scalar `load`
     volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state (None: unknown)
 A *control* (hifi.control) closes the equations for the load. Between factorisations, steps are corrected by the secants seen
 so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear Algebra Appl. 16, 2009): the residual
-that the past increments explain is removed before the lagged tangent sees the rest. One solve and one residual an iteration.
+that the past increments explain is removed before the lagged tangent sees the rest. One solve and one residual an iteration. On slender bodies a lagged tangent
+is no help once walls have bulged, however small the step: what it makes worse is taken back, which costs a solve, and the
+tangent factorised where the correction started, which lets steps be many times longer.
 """
 
 from dataclasses import dataclass, field
@@ -30,7 +32,7 @@ class NewtonOptions:
 
     relative_tolerance: float = 1e-8
     absolute_tolerance: float = 1e-11
-    patience: float = 30.0
+    patience: float = 12.0
     maximum_iterations: int = 60
     growth_limit: float = 1e4
     secants: int = 8
@@ -72,21 +74,29 @@ class Newton:
         """Iterate from the current state to equilibrium at the control's `parameter`; NotConverged otherwise."""
         o, system, control = self.options, self.system, self.control
         r, norm, scale = self.residual()
-        history, secants, fresh = [norm], Secants(system, o.secants), 0
+        history, secants = [norm], Secants(system, o.secants)
+        since, fresh = [norm], False  # residuals that the lagged tangent has left; whether it is of the present state
         for iteration in range(o.maximum_iterations + 1):
             tolerance = o.relative_tolerance * scale + o.absolute_tolerance
             if norm <= tolerance and control.satisfied(system, parameter):
                 return NewtonResult(iteration, history)
-            if not self.current or (len(history) - fresh > 1 and iterations_left(history[fresh:], tolerance) > o.patience):
+            if not self.current or iterations_left(since, tolerance) > o.patience:
                 self.factorise()
                 secants.forget()
-                fresh = len(history) - 1 + (len(history) > 1)
+                since, fresh = [], True
+            state, load = system.state.copy(), system.load
             step, load_step = self.timed("solve", self._correction, r, parameter, secants)
-            system.state = system.moved(system.state, step)
+            system.state = system.moved(state, step)
             system.load += load_step
-            before, (r, norm, scale) = r, self.residual()
-            secants.add(step, load_step, r - before)
-            history.append(norm)
+            new, new_norm, new_scale = self.residual()
+            history.append(new_norm)
+            if not fresh and not new_norm < norm:
+                # worse by a lagged tangent: take the correction back and factorise where it started
+                system.state, system.load, self.current = state, load, False
+                continue
+            secants.add(step, load_step, new - r)
+            r, norm, scale, fresh = new, new_norm, new_scale, False
+            since.append(norm)
             if not np.isfinite(norm) or norm > o.growth_limit * max(history[0], scale):
                 raise NotConverged(f"residual grew to {norm:.1e} N")
         raise NotConverged(f"residual {norm:.1e} N after {o.maximum_iterations} iterations (tolerance {tolerance:.1e} N)")
