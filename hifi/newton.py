@@ -8,9 +8,9 @@ A *system* (hifi.body, hifi.cell_system) has a state (an array), a scalar `load`
     volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state (None: unknown)
 A *control* (hifi.control) closes the equations for the load. Between factorisations, steps are corrected by the secants seen
 so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear Algebra Appl. 16, 2009): the residual
-that the past increments explain is removed before the lagged tangent sees the rest. One solve and one residual an iteration. On slender bodies a lagged tangent
-is no help once walls have bulged, however small the step: what it makes worse is taken back, which costs a solve, and the
-tangent factorised where the correction started, which lets steps be many times longer.
+that the past increments explain is removed before the lagged tangent sees the rest. One solve and one residual an iteration.
+On slender bodies a lagged tangent is no help once walls have bulged, however small the step. What it makes worse is taken
+back, which costs a solve, and the tangent is factorised where the correction started: steps can be many times longer.
 """
 
 from dataclasses import dataclass, field
