@@ -11,6 +11,7 @@ stiffness keeps its inner nodes in place. Serial: designs are spread over ranks,
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.sparse.csgraph
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
@@ -24,12 +25,19 @@ from hifi.materials import energy_density
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
 DEGREE = 4
+#: rows of the gauge that see e2 and e3: a sideways displacement X1 e turns about z and y
+_SIDEWAYS = np.zeros((6, 6))
+_SIDEWAYS[4, 2], _SIDEWAYS[5, 1] = -1, 1
 
 
 class CellProblem:
-    """Unknowns, residual and tangent of the cell of `segment` meshed at `path` (geometry.cell.mesh_cell)."""
+    """Unknowns, residual and tangent of the cell of `segment` meshed at `path` (geometry.cell.mesh_cell).
 
-    def __init__(self, segment, path):
+    Any pitch of the periodic body will do, whatever its cut's place or shape. gauge: tags of the facets whose rigid fit is
+    the section frame; centre: X1 (mm) where that frame sits, in the middle of the pitch over which it is fitted.
+    """
+
+    def __init__(self, segment, path, gauge=(cad.CHANNEL,), centre=0.0):
         self.segment, comm = segment, MPI.COMM_SELF
         self.mesh, self.cell_tags, self.facet_tags = compat.read_mesh(path, comm)
         mesh = self.mesh
@@ -46,7 +54,7 @@ class CellProblem:
         self._right = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
         self._define_forms()
         self._reduce()
-        self._define_gauge()
+        self._define_gauge(gauge, centre)
 
     def _define_forms(self):
         mesh, material = self.mesh, self.segment.material
@@ -79,16 +87,12 @@ class CellProblem:
 
     def _reduce(self):
         """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p has -1."""
-        half, n = self.segment.pitch / 2, len(self.state.x.array)
+        pitch, n = self.segment.pitch, len(self.state.x.array)
         master = np.arange(n)
         points = self.pressure_space.tabulate_dof_coordinates()
         for coordinates, dofs in ((self.nodes, self.displacement_dofs), (points, self.pressure_dofs[:, None])):
-            low = np.flatnonzero(np.abs(coordinates[:, 0] + half) < 1e-6)
-            high = np.flatnonzero(np.abs(coordinates[:, 0] - half) < 1e-6)
-            distance, match = cKDTree(coordinates[low][:, 1:]).query(coordinates[high][:, 1:])
-            if len(low) != len(high) or distance.max() > 1e-5:
-                raise ValueError("the cell's mesh is not periodic")
-            master[dofs[high]] = dofs[low[match]]
+            first = _same_modulo(coordinates, pitch)
+            master[dofs] = dofs[first]
         solid = self.cell_tags.indices[self.cell_tags.values != AIR]
         used = np.zeros(n, bool)
         used[self.displacement_dofs] = True
@@ -101,27 +105,32 @@ class CellProblem:
         #: number of incompressibility multipliers: so many negative pivots has a stable tangent
         self.constraints = int(np.count_nonzero(np.isin(kept, self.pressure_dofs)))
 
-    def _define_gauge(self):
+    def _define_gauge(self, tags, centre):
         """gauge (unknowns, 6) and gauge_strains (6, 6): the section frame's conditions are linear in u and (e, k).
 
-        Mean displacement (3) and mean rotation (3) of the channel's wall over the pitch are zero. The wall's points also
-        lie along X1, where the shears e2 and e3 displace them sideways by X1 e: a frame fitted over a pitch follows
-        mostly the tangent, and so must the gauge.
+        Mean displacement (3) and mean rotation (3) of the tagged facets over the pitch around `centre` are zero. Their
+        points also lie along X1, where the shears e2 and e3 displace them sideways by X1 e: a frame fitted over a pitch
+        follows mostly the tangent, and so must the gauge.
         """
-        wall = surface.facet_nodes(self, cad.CHANNEL)
-        integral = surface.SlabIntegral(self, wall)
-        w, first = integral.weights / integral.area, integral.first / integral.area
-        size = self.segment.width
-        rows = np.zeros((6, len(w), 3))
-        rows[[0, 1, 2], :, [0, 1, 2]] = w
-        for i, (a, b) in enumerate(((1, 2), (2, 0), (0, 1)), start=3):  # (X x u)_i = X_a u_b - X_b u_a
-            rows[i, :, b], rows[i, :, a] = first[:, a] / size, -first[:, b] / size
-        along = (self.nodes[integral.nodes, 0] @ first[:, 0]) / size  # mean of X1^2 over the wall
+        facets, pitch = surface.facet_nodes(self, *tags), self.segment.pitch
+        # the periodic surface in the window: what is in it of this pitch and of its neighbours
+        windows = [(i * pitch, surface.SlabIntegral(self, facets, *(centre + pitch * (np.array([-0.5, 0.5]) - i)))) for i in (-1, 0, 1)]
+        area, size = sum(w.area for _, w in windows), self.segment.width
         self.gauge_strains = np.zeros((6, 6))
-        self.gauge_strains[4, 2], self.gauge_strains[5, 1] = -along, along
-        columns = self.reduced[self.displacement_dofs[integral.nodes]]
-        data = [(row.ravel(), (columns.ravel(), np.full(row.size, i))) for i, row in enumerate(rows)]
-        self.gauge = sum(sp.coo_matrix(d, shape=(self.unknowns, 6)).tocsr() for d in data)
+        gauge = sp.csr_matrix((self.unknowns, 6))
+        for shift, integral in windows:
+            w, first = integral.weights / area, integral.first / area
+            first[:, 0] += (shift - centre) * w
+            rows = np.zeros((6, len(w), 3))
+            rows[[0, 1, 2], :, [0, 1, 2]] = w
+            for i, (a, b) in enumerate(((1, 2), (2, 0), (0, 1)), start=3):  # (X x u)_i = X_a u_b - X_b u_a
+                rows[i, :, b], rows[i, :, a] = first[:, a] / size, -first[:, b] / size
+            along = ((self.nodes[integral.nodes, 0] + shift - centre) @ first[:, 0]) / size  # X1^2
+            self.gauge_strains += along * _SIDEWAYS
+            columns = self.reduced[self.displacement_dofs[integral.nodes]]
+            for i, row in enumerate(rows):
+                gauge += sp.coo_matrix((row.ravel(), (columns.ravel(), np.full(row.size, i))), shape=gauge.shape).tocsr()
+        self.gauge = gauge
 
     def expand(self, values):
         """State array of the mixed space from the unknowns (unknowns,)."""
@@ -166,3 +175,18 @@ class CellProblem:
     def air_volume(self):
         """Volume (mm3) of the air in one pitch."""
         return float(fem.assemble_scalar(self._volume))
+
+
+def _same_modulo(points, pitch, tolerance=1e-5):
+    """(n,) index of the first of those points (n, 3) that coincide when X1 is taken modulo the pitch; tolerance in mm."""
+    wrapped = points.copy()
+    wrapped[:, 0] = np.mod(points[:, 0], pitch)
+    wrapped[wrapped[:, 0] >= pitch, 0] = 0.0
+    far = 2 * np.ptp(points, axis=0) + 1.0
+    wrapped[:, 1:] -= wrapped[:, 1:].min(axis=0)  # the tree's box starts at zero
+    pairs = cKDTree(wrapped, boxsize=[pitch, *(2 * far[1:])]).query_pairs(tolerance, output_type="ndarray")
+    graph = sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
+    _, labels = sp.csgraph.connected_components(graph, directed=False)
+    first = np.full(labels.max() + 1, len(points))
+    np.minimum.at(first, labels, np.arange(len(points)))
+    return first[labels]
