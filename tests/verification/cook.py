@@ -16,8 +16,8 @@ PUBLISHED = 6.89
 
 
 def panel(X):
-    """Where the vertices (n, 3) of the box 48 x 1 go."""
-    x, s, z = X.T
+    """Where the vertices (n, 3) of the box 48 x 1 go: bricks grow from the clamped end and from both edges."""
+    x, s, z = 48 * (X[:, 0] / 48) ** 1.5, 0.3 * X[:, 1] + 0.35 * (1 - np.cos(np.pi * X[:, 1])), X[:, 2]
     return np.stack([x, 44 * x / 48 + s * (44 - 28 * x / 48), z], axis=1)
 
 

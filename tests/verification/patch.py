@@ -12,7 +12,7 @@ SIDES = (bodies.PLANE_X, bodies.END, bodies.PLANE_Y, bodies.END_Y)
 
 def distorted(X):
     """Vertices (n, 3) of the unit cube, inner ones moved by up to a tenth; faces stay plane."""
-    bubble = (16 * X * (1 - X)).prod(axis=1, keepdims=True) / 16
+    bubble = (4 * X * (1 - X)).prod(axis=1, keepdims=True)
     return X + 0.1 * bubble * np.sin(np.array([[13.0, 29.0, 41.0], [37.0, 17.0, 23.0], [19.0, 31.0, 11.0]]) @ X.T).T
 
 
