@@ -37,7 +37,7 @@ class Fibres:
         return c["C"] / 2 * (ufl.exp(Q) - 1)
 
 
-def beam(cells=(32, 4, 4)):
+def beam(cells):
     """(deformed z of the point (10, 0.5, 1) in mm, dofs)."""
     mesh = bodies.box((10.0, 1.0, 1.0), cells)
     system = body_system(mesh, [Support(bodies.PLANE_X)], [Pressure((bodies.PLANE_Z,), closed=False)], Fibres(), spacing=1.0)

@@ -6,7 +6,7 @@ from tests.verification import cook, energy_balance, land, manufactured, patch
 
 
 def test_land_problem_1():
-    z, _ = land.beam((32, 4, 4))
+    z, _ = land.beam((24, 4, 4))
     assert land.RANGE[0] <= z <= land.RANGE[1]
 
 
