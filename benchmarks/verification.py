@@ -14,7 +14,7 @@ from benchmarks.tables import table
 ENERGY_INTERVALS = 16
 LAND_MESHES = ((8, 2, 2), (16, 2, 2), (24, 4, 4), (32, 4, 4), (48, 6, 6))
 COOK_MESHES = (4, 8, 16, 32)
-MANUFACTURED_MESHES = (4, 8, 16)
+MANUFACTURED_MESHES = (2, 4, 8, 16)
 
 
 def verification():

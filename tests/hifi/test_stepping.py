@@ -18,6 +18,9 @@ class Wall:
     def advance(self, load):
         raise self.error
 
+    def diagnosis(self):
+        return ""
+
 
 @pytest.mark.parametrize("error", [NotConverged("grew"), PredictorTooFar("off")])
 def test_a_path_that_never_advances_ends_with_its_reason(error):

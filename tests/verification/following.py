@@ -42,10 +42,10 @@ def body_system(mesh, supports, loads, material=None, spacing=None, body_force=N
     return BodySystem(problem, RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm, spacing), apply)
 
 
-def follow(system, loads, observe, first=0.1, control=None, start=0.0):
+def follow(system, loads, observe, first=0.1, control=None, start=0.0, options=None):
     """[observe()] at each of the growing `loads`, or values of another control's parameter from `start` on."""
     seen = {}
-    path = EquilibriumPath(system, control or LoadControl(), start=start)
+    path = EquilibriumPath(system, control or LoadControl(), options, start)
     run_steps(path, loads[-1], StepSize(first, 1e-4, milestones=tuple(loads)), lambda step: seen.update({step.load: observe()}))
     return [seen[load] for load in loads]
 

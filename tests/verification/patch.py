@@ -3,6 +3,7 @@
 import numpy as np
 
 from hifi.loads import Pressure
+from hifi.newton import NewtonOptions
 from hifi.problem import Support
 from tests.verification import bodies
 from tests.verification.following import body_system, follow, largest
@@ -38,7 +39,7 @@ def affine(pressure=0.2):
     system = body_system(bodies.box((1.0, 1.0, 1.0), (3, 3, 3), distorted), supports, [Pressure((bodies.END_Z,), closed=False)])
     problem, P = system.problem, pressure
     system.apply_load = lambda load: setattr(problem.loads[0].value, "value", P * load)
-    follow(system, [1.0], lambda: None, first=0.25)
+    follow(system, [1.0], lambda: None, first=0.25, options=NewtonOptions(relative_tolerance=1e-13))
     F = gradient(1.0)
     p = -P - F[2, 2] ** 2 + np.sum(F * F) / 3
     errors = largest(problem, problem.displacement() - motion(problem.nodes, 1.0)), largest(problem, problem.pressure_field() - p)

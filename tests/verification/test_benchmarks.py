@@ -17,12 +17,14 @@ def test_cook_s_membrane():
 
 
 def test_manufactured_solution_converges_with_full_order():
-    order_u, order_p = manufactured.orders(*(manufactured.errors(cells) for cells in (4, 8)))
-    assert order_u >= 2.8 and order_p >= 1.8
+    errors = [manufactured.errors(cells) for cells in (2, 4, 8)]
+    for coarse, fine in zip(errors, errors[1:]):
+        order_u, order_p = manufactured.orders(coarse, fine)
+        assert order_u >= 2.8 and order_p >= 1.8
 
 
 def test_affine_deformation_is_exact_on_a_distorted_mesh():
-    assert max(patch.affine()) < 1e-8
+    assert max(patch.affine()) < 1e-10
 
 
 def test_constant_pressure_is_exact_on_a_distorted_mesh():
