@@ -170,8 +170,7 @@ def cantilever(name, cells=(60, 2, 2)):
     """(tip (x, z) of a strip under one of STRIP_LOADS, that of the elastica with E = 3 mu and I = w h^3/12)."""
     length, width, height = STRIP
     load, elastica = STRIP_LOADS[name]
-    mesh = bodies.box(STRIP, cells, lambda X: X - [0.0, width / 2, height / 2])
-    system = body_system(mesh, [Support(bodies.PLANE_X)], [load], spacing=4.0)
+    system = body_system(bodies.strip(STRIP, cells), [Support(bodies.PLANE_X)], [load], spacing=4.0)
     follow(system, [1.0], lambda: None, first=0.2)
     X, u = from_all_ranks(system.problem, lambda X: X[:, 0] > length - 1e-6)
     system.destroy()
