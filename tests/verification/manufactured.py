@@ -29,9 +29,8 @@ def shifted_pressure(X, sin, cos):
     return sin(2 * X[0] + X[2]) * cos(2 * X[1])
 
 
-def exact(mesh):
-    """(u, F, q, p) as symbols on the mesh."""
-    X = ufl.SpatialCoordinate(mesh)
+def exact(X):
+    """(u, F, q, p) as functions of the symbol X."""
     u = ufl.as_vector(displacement(X, ufl.sin, ufl.cos))
     F, q = ufl.Identity(3) + ufl.grad(u), shifted_pressure(X, ufl.sin, ufl.cos)
     return u, F, q, q + ufl.inner(F, F) / 3
@@ -44,7 +43,7 @@ class Traction:
 
     def term(self, problem, u, v):
         self.value = fem.Constant(problem.mesh, PETSc.ScalarType(0.0))
-        _, F, q, _ = exact(problem.mesh)
+        _, F, q, _ = exact(ufl.SpatialCoordinate(problem.mesh))
         N = ufl.FacetNormal(problem.mesh)
         ds = ufl.Measure("ds", domain=problem.mesh, subdomain_data=problem.facet_tags, metadata={"quadrature_degree": 6})
         return -self.value * ufl.inner(F * N + q * ufl.inv(F).T * N, v) * ds(bodies.END)
@@ -54,8 +53,7 @@ class Traction:
 
 
 def body_force(X):
-    mesh = X.ufl_domain()
-    u, F, q, _ = exact(mesh)
+    u, F, q, _ = exact(X)
     return -(ufl.div(ufl.grad(u)) + ufl.inv(F).T * ufl.grad(q))
 
 
@@ -71,7 +69,7 @@ def errors(cells):
     problem = system.problem
     solve_from(system, 1.0, motion, lambda X: shifted_pressure(X.T, np.sin, np.cos))
     u, p = ufl.split(problem.state)
-    u_exact, _, _, p_exact = exact(problem.mesh)
+    u_exact, _, _, p_exact = exact(ufl.SpatialCoordinate(problem.mesh))
     dx = ufl.Measure("dx", domain=problem.mesh, metadata={"quadrature_degree": 6})
     found = []
     for difference in (u - u_exact, p - p_exact):
