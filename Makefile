@@ -17,9 +17,9 @@ setup: ## install what is missing: Debian packages (root or sudo), .venv, pneune
 demo: setup ## target curve -> design -> CAD -> finite elements -> report
 	$(DEMO)
 
-test: setup ## all tests; those of hifi again on 2 ranks
+test: setup ## all tests; those of the finite elements again on 2 ranks
 	$(VENV)/python -m pytest
-	$(VENV)/pneunet run -n $(RANKS) -- python -m pytest -q -p no:cacheprovider tests/hifi
+	$(VENV)/pneunet run -n $(RANKS) -- python -m pytest -q -p no:cacheprovider tests/hifi tests/verification
 
 bench: setup ## measure the figures (ONLY=part for one part)
 	$(VENV)/python -m benchmarks $(if $(ONLY),--only $(ONLY))

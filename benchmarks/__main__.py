@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, speed
+from benchmarks import cell, chain, speed, verification
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"
@@ -24,6 +24,7 @@ PARTS = {
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
+    "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
     "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
     "scaling": (speed.scaling, "seconds of assembly, factorisation and solution on three meshes, and their exponents"),
@@ -43,6 +44,17 @@ MEANING = {
     "cell_mesh_error_rel": "that cell at 1.5 mm: error of (e, k pitch) at 20 and 50 kPa against strains extrapolated from 1 and 0.8 mm",
     "cell_stiffness_fd_rel": "that cell at 20 kPa, 2 mm: stiffness against central differences of forces, relative to roots of diagonals",
     "cell_stiffness_refinement_rel": "that cell at 50 kPa: largest eigenvalue of K(0.8 mm)^-1 K(1 mm) - 1",
+    "sphere_max_rel_error": "inflated sphere: largest relative error of the inner radius at P/mu = 0.1 .. 0.8",
+    "sphere_past_limit_rel_error": "the same under volume control through the limit point to a = 2.2: largest error of the pressure",
+    "tube_max_rel_error": "tube held at its length: largest error of the inner radius at P/mu = 0.1 .. 0.6",
+    "capped_tube_max_rel_error": "capped tube: largest error of inner radius and axial stretch at P/mu = 0.1 .. 0.5",
+    "torsion_rel_error": "stretched and twisted solid cylinder: larger error of torque and axial force",
+    "flexure_rel_error": "block bent in plane strain, k = 0.1 .. 1.5: largest error of the moment",
+    "land1_z_mm": "Land et al. problem 1, 48 x 6 x 6 bricks: deformed z of (10, 0.5, 1); other codes 4.15 .. 4.19 mm",
+    "cook_rel_error": "Cook's membrane, 32 x 32 bricks: error of the corner's rise against its own extrapolated value",
+    "mms_order_u": "manufactured solution, 8^3 to 16^3 bricks: observed order of u in L2",
+    "mms_order_p": "the same of p",
+    "energy_balance_rel": "shipped body to 20 kPa: work of the pressure (Simpson, 16 intervals) against the stored energy",
     "long_segment_steps": "case one-sided-long, 26 chambers, 60 deg, 0-50 kPa, h = 2 mm: accepted steps",
     "long_segment_factorisations": "the same: factorisations, failed attempts included",
     "ramp_ratio_same_strategy_h2": "ramp twist-w12 at h = 2 mm, same predictor and lagging: our time over the faster of FElupe and NGSolve",
@@ -107,6 +119,8 @@ def snapshot():
         lines.append(f"| {part} | {m['date']} | {m['revision']} | {where} | {m['calibration_seconds']:.3f} |")
     write_text(ROOT / "docs" / "figures.md", "\n".join(lines) + "\n")
     write_text(ROOT / "docs" / "speed.md", speed.page(results, meta))
+    if "verification" in meta:
+        write_text(ROOT / "docs" / "verification.md", verification.page(meta, ROOT / "docs"))
 
 
 def main():

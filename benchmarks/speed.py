@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.rivals import environment, meshes
+from benchmarks.tables import table
 from pneunet import launch
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -163,12 +164,8 @@ RAMP_FIGURES = {
 }
 
 
-def _table(head, rows):
-    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(map(str, row)) + " |" for row in rows)]
-
-
 def _figures(results, meaning):
-    return _table(["what", "value"], [[text, f"{results[key]:.3g}"] for key, text in meaning.items() if key in results])
+    return table(["what", "value"], [[text, f"{results[key]:.3g}"] for key, text in meaning.items() if key in results])
 
 
 def _ramp_table(runs):
@@ -179,16 +176,16 @@ def _ramp_table(runs):
         counts = [f["iterations"], f["factorisations"]]
         rows.append([f["mesh_size_mm"], f["dofs"], f["strategy"], NAMES[f["code"]], *seconds, f"{f['cpu_seconds']:.2f}", *counts, *parts])
     head = ["h, mm", "dofs", "strategy", "code", "least s", "median", "largest", "processor s", "iterations", "factorisations"]
-    return _table([*head, *(f"{name}, s" for name in OPERATIONS)], rows)
+    return table([*head, *(f"{name}, s" for name in OPERATIONS)], rows)
 
 
 def _scaling_table(results, operations):
     rows = [[f["mesh_size_mm"], f["dofs"], *(f"{f[name]:.4f}" for name in OPERATIONS)] for f in operations]
     rows.append(["exponent", "", *(f"{results[f'{name}_exponent']:.2f}" for name in OPERATIONS)])
-    return _table(["h, mm", "dofs", *(f"{name}, s" for name in OPERATIONS)], rows)
+    return table(["h, mm", "dofs", *(f"{name}, s" for name in OPERATIONS)], rows)
 
 
 def _ranks_table(results, runs):
     rows = [[f["ranks"], f["dofs"], f"{f['seconds']:.2f}", f"{f['largest_seconds']:.2f}"] for f in runs]
     speedup = f"Two ranks are {results['ranks2_speedup_150k']:.2f} times as fast as one on the ramp's first two steps."
-    return [*_table(["ranks", "dofs", "least s", "largest s"], rows), "", speedup]
+    return [*table(["ranks", "dofs", "least s", "largest s"], rows), "", speedup]

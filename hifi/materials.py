@@ -11,8 +11,6 @@ from petsc4py import PETSc
 from ufl.algorithms import extract_coefficients
 from ufl.algorithms.transformer import strip_variables
 
-from base.materials import LAWS
-
 
 def invariants(F):
     """(I1, I2) of the isochoric part of F^T F."""
@@ -105,9 +103,8 @@ ENERGIES = {
     "Gent": gent,
     "Ogden": ogden,
 }
-#: law name -> names of what a form takes from the material as constants
-PARAMETERS = {law: (*cls.parameters, "bulk_compliance") for law, cls in LAWS.items()}
-PARAMETERS["Ogden"] = ("half_power_weights", "bulk_compliance")
+#: law name -> names of what its energy takes as constants, where these are not the law's own parameters
+CONSTANTS = {"Ogden": ("half_power_weights",)}
 
 
 def volumetric(c, J, p):
@@ -116,6 +113,12 @@ def volumetric(c, J, p):
 
 
 def energy_density(mesh, material, F, p):
-    """W(F) + p (J - 1) - p^2/(2K) in MPa, the law's parameters as constants of `mesh`. Stored energy at equilibrium."""
-    c = {name: fem.Constant(mesh, PETSc.ScalarType(getattr(material, name))) for name in PARAMETERS[material.law]}
-    return ENERGIES[material.law](c, F) + volumetric(c, ufl.det(F), p)
+    """W(F) + p (J - 1) - p^2/(2K) in MPa, the law's parameters as constants of `mesh`. Stored energy at equilibrium.
+
+    material: a law of base.materials, or any other that brings its own `energy(c, F)` in MPa beside what those have: `law`,
+    `parameters` (names of its constants c) and `bulk_compliance`.
+    """
+    energy = getattr(material, "energy", None) or ENERGIES[material.law]
+    names = (*CONSTANTS.get(material.law, material.parameters), "bulk_compliance")
+    c = {name: fem.Constant(mesh, PETSc.ScalarType(getattr(material, name))) for name in names}
+    return energy(c, F) + volumetric(c, ufl.det(F), p)

@@ -78,12 +78,11 @@ def run_steps(path, target, size, on_step=lambda step: None, before=None):
         attempted = load - path.parameter
         try:
             iterations, factorisations, residual = path.advance(load)
-        except PredictorTooFar:
-            step = 0.75 * attempted
-            continue
         except NotConverged as error:
-            result.failures.append((load, str(error)))
-            step = attempted * size.cutback_factor
+            too_far = isinstance(error, PredictorTooFar)  # nothing but a residual was spent
+            step = attempted * (0.75 if too_far else size.cutback_factor)
+            if not too_far:
+                result.failures.append((load, str(error)))
             if step < size.smallest:
                 result.reason = str(error)
                 failure = ConvergenceError(

@@ -115,17 +115,6 @@ def test_free_segments_keep_their_symmetry(shared_directory):
         assert np.abs(others).max() < (0.05 if large == 0 else 0.02) * np.linalg.norm(k)
 
 
-def test_work_of_the_pressure_is_stored(reference):
-    """int P dV over the steps (cubic rule through the accepted states) equals the elastic energy."""
-    states = [(0.0, reference.problem.cavity_volume())]
-    reference.run(0.02, lambda m: states.append((m.pressure, m.volume)), milestones=np.linspace(0, 0.02, 11)[1:])
-    from scipy.interpolate import CubicSpline
-
-    P, V = np.array(states).T
-    work = P[-1] * V[-1] - P[0] * V[0] - CubicSpline(P, V).integrate(0.0, P[-1])
-    assert work == pytest.approx(reference.problem.stored_energy(), rel=1e-5)
-
-
 def test_pressure_out_of_reach_keeps_what_converged(shared_directory):
     thin = {"wall": 0.5, "top_wall": 0.5, "side_wall": 0.5}
     soft = Manipulator((Segment("one-sided", 90.0, 1, chamber_height=8.0, **thin),))

@@ -1,0 +1,28 @@
+"""The stepper by itself, on paths that do what the test wants."""
+
+import pytest
+
+from base.errors import ConvergenceError
+from hifi.solver import NotConverged, PredictorTooFar
+from hifi.stepping import StepSize, run_steps
+
+
+class Wall:
+    """Every step fails with `error`."""
+
+    parameter = 0.0
+
+    def __init__(self, error):
+        self.error = error
+
+    def advance(self, load):
+        raise self.error
+
+    def diagnosis(self):
+        return ""
+
+
+@pytest.mark.parametrize("error", [NotConverged("grew"), PredictorTooFar("off")])
+def test_a_path_that_never_advances_ends_with_its_reason(error):
+    with pytest.raises(ConvergenceError, match=str(error)):
+        run_steps(Wall(error), 1.0, StepSize(0.5, 1e-3))
