@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from base.errors import InputError
 from hifi.manipulator import DEAD_LOADS
-
-KPA = 1e3  # kPa per MPa
+from hifi.results import KPA
 
 
 @dataclass(frozen=True)
@@ -92,12 +91,3 @@ class Goal:
             f"{what} not reached: stopped at {self.where(stage, parameter)} ({result.reason}), "
             f"{result.diagnosis or f'usually by {why}'}; the result up to there is in {out}; try {remedy}"
         )
-
-
-def limit_text(point):
-    """A hifi.path.LimitPoint of the pressure in words."""
-    return f"limit point: pressure {point.load * KPA:.4g} kPa ({point.kind}) at volume {point.volume:.4g} mm3"
-
-
-def limit_table(point):
-    return {"pressure_kPa": point.load * KPA, "volume_mm3": point.volume, "kind": point.kind}

@@ -15,10 +15,10 @@ from geometry.designfile import body_tables
 from geometry.loading import Extras
 from hifi import checkpoint, compat, tip
 from hifi.agreement import on_rank_0
-from hifi.goal import Goal, limit_table, limit_text
+from hifi.goal import Goal
 from hifi.manipulator import ManipulatorSolve
 from hifi.output import FieldWriter
-from hifi.results import KPA, ResultFiles
+from hifi.results import KPA, ResultFiles, limit_table, limit_text
 from hifi.stepping import StepResult
 
 

@@ -60,3 +60,13 @@ class ResultFiles:
             "segment side gap gap_mm distance_mm".split(),
             [[*gap, d] for gap, d in zip(self.gaps, m.walls)],
         )
+
+
+def limit_text(point):
+    """A hifi.path.LimitPoint of the pressure in words."""
+    return f"limit point: pressure {point.load * KPA:.4g} kPa ({point.kind}) at volume {point.volume:.4g} mm3"
+
+
+def limit_table(point):
+    """The same for run.json."""
+    return {"pressure_kPa": point.load * KPA, "volume_mm3": point.volume, "kind": point.kind}

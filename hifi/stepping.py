@@ -62,7 +62,8 @@ def run_steps(path, target, size, on_step=lambda step: None, before=None):
     """Drive `path` from its current load to `target`; return a StepResult.
 
     path.parameter, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
-    its last accepted state, path.diagnosis() -> words on why it cannot go on. `on_step(step)` is called after each accepted step (hooks write results there).
+    its last accepted state, path.diagnosis() -> words on why it cannot go on. `on_step(step)` is called after each accepted
+    step (hooks write results there).
     `before`: the last Step of a run that this one continues; its numbers, seconds and step size go on. Raises
     ConvergenceError, with the StepResult as its `result`, when steps fall below size.smallest.
     """

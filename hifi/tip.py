@@ -45,7 +45,7 @@ def stiffness(solve):
     K = np.linalg.inv(compliance(solve.system, cad.TIP, frame))
     return {
         "pressure_kPa": float(solve.pressure.value.value) * 1e3,
-        "rows": "force_N (3), moment_N_mm (3) per columns displacement_mm (3), rotation_rad (3), axes and origin of the tip's section frame",
+        "rows": "force_N, moment_N_mm; columns: displacement_mm, rotation_rad; in axes and about origin of the tip's section frame",
         "frame_origin_mm": frame[:3, 3].tolist(),
         "frame_axes": frame[:3, :3].T.tolist(),
         "matrix": K.tolist(),
