@@ -62,6 +62,11 @@ class Goal:
             return f"{parameter * 100:.4g} % of the dead loads"
         return f"{parameter * KPA:.4g} kPa" if stage == "pressure" else f"{parameter:.4g} {'mm3' if stage == 'volume' else 'mm'}"
 
+    def done(self, m, stage, parameter):
+        """The last line's beginning, of the last state."""
+        pressure = f" at {m.pressure * KPA:.4g} kPa" * (stage in ("volume", "arc length"))
+        return f"done: {self.where(stage, parameter)}{pressure}"
+
     def progress(self, m, stage, done, breaks_at):
         """The line of an accepted state (hifi.manipulator.Measured), `done` of the whole stage."""
         eta = m.seconds / done * (1 - done)

@@ -143,7 +143,8 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
         say("blocked force: the same body with its tip held")
         extras["blocked_force"] = tip.blocked_force(design.manipulator, mesh_path, last[0].pressure, loads, comm)
         _written(comm, out, lambda: record(status, result.failures))
-    say("; ".join([f"done: {goal.where(solve.stage, solve.path.parameter)}", *map(limit_text, last[0].limit_points), f"results in {out}"]))
+    ending = goal.done(last[0], solve.stage, solve.path.parameter)
+    say("; ".join([ending, *map(limit_text, last[0].limit_points), f"results in {out}"]))
     return last[0]
 
 
