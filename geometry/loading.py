@@ -30,6 +30,14 @@ class DeadLoads:
         turn = np.asarray(base_pose)[:3, :3].T
         return DeadLoads(*(tuple(map(float, turn @ getattr(self, f.name))) for f in fields(self)))
 
+    def text(self):
+        """The loads that act, in words; '' without any."""
+        words = []
+        for key, value in self.table().items():
+            name, unit = ("gravity", "m/s2") if "gravity" in key else ("tip force", "N") if "force" in key else ("tip moment", "N mm")
+            words.append(f"{name} ({', '.join(f'{v:g}' for v in value)}) {unit}")
+        return ", ".join(words)
+
     def table(self):
         """The loads that act, as in [loads]; empty without any."""
         return {key: value for key, value in to_table(self).items() if any(value)}

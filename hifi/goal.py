@@ -62,6 +62,11 @@ class Goal:
             return f"{parameter * 100:.4g} % of the dead loads"
         return f"{parameter * KPA:.4g} kPa" if stage == "pressure" else f"{parameter:.4g} {'mm3' if stage == 'volume' else 'mm'}"
 
+    def plan(self):
+        """What will be walked, in words."""
+        inflation = f"{self.key} to {self.value:g}"
+        return "dead loads alone" if self.is_last(DEAD_LOADS) else f"dead loads, then {inflation}" if self.dead else inflation
+
     def done(self, m, stage, parameter):
         """The last line's beginning, of the last state."""
         pressure = f" at {m.pressure * KPA:.4g} kPa" * (stage in ("volume", "arc length"))

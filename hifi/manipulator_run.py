@@ -49,7 +49,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
     writer = FieldWriter(out, solve.problem, solve.stretch) if fields else None
     say(
         f"solve: {facts['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size} rank{'s' * (comm.size > 1)}, "
-        f"{'dead loads, then ' * bool(loads)}{goal.key} to {goal.value:g}; set up in {time.perf_counter() - started:.1f} s"
+        f"{goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
     )
     breaks_at = break_stretch(design.manipulator)
     last, history, before, extras = [], [], None, {}
