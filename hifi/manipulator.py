@@ -90,12 +90,12 @@ class ManipulatorSolve:
     def begin(self, stage):
         """From the present state on, walk along `stage`: DEAD_LOADS from none to all, or inflate under the control so called."""
         if stage == DEAD_LOADS:
-            self.system.steer(self._set_dead)
+            self.system.steer(self._set_dead, 0.0)
         else:
             self._set_dead(1.0)
-            self.system.steer(self._set_pressure)
+            self.system.steer(self._set_pressure, float(self.pressure.value.value))
         control = {"volume": VolumeControl, "arc length": lambda: ArcLength(self.system)}.get(stage, LoadControl)()
-        start = self.system.volume() if stage == "volume" else 0.0
+        start = {"volume": self.system.volume(), "arc length": 0.0}.get(stage, self.system.load)
         before, self.stage = self.path, stage
         self.path = EquilibriumPath(self.system, control, self.newton_options, start)
         if before:

@@ -121,7 +121,7 @@ def test_what_is_measured_at_the_end_is_recorded_and_not_twice(tmp_path, capsys)
 
 
 BAD = {
-    "gravity's unit": ("pressure_kPa = 1", "[loads]\ngravity = [0, 0, 1]", "[loads]: key 'gravity' has the wrong unit: write 'gravity_m_per_s2'"),
+    "gravity's unit": ("pressure_kPa = 1", "[loads]\ngravity = [0, 0, 1]", "key 'gravity' has the wrong unit: write 'gravity_m_per_s2'"),
     "not a vector": ("pressure_kPa = 1", "[loads]\ntip_force_N = 3", "[loads]: 'tip_force_N' must be three numbers, [x, y, z], not 3"),
     "not a number": ("pressure_kPa = 1", "[loads]\ntip_moment_N_mm = [0, 0, nan]", "[loads]: 'tip_moment_N_mm' must be a finite number"),
     "nothing to do": ("pressure_kPa = 0", "[loads]\ntip_force_N = [0, 0, 0]", "pressure_kPa = 0 leaves nothing to solve"),
