@@ -22,12 +22,24 @@ from hifi.results import KPA, ResultFiles, limit_table, limit_text
 from hifi.stepping import StepResult
 
 
-def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, comm=MPI.COMM_WORLD, say=print, resume=False):
+def solve_design(
+    design,
+    directory,
+    mesh_size=None,
+    pressure=None,
+    fields=True,
+    comm=MPI.COMM_WORLD,
+    say=print,
+    resume=False,
+    milestones=(),
+    on_measured=lambda measured: None,
+):
     """Mesh (if not there yet) and solve a geometry.designfile.Design; files in directory/mesh and directory/solve.
 
     mesh_size in mm and pressure in MPa override the design's. `resume` goes on from directory/solve/checkpoint.npz, which
-    every accepted step leaves, on any number of ranks. Returns the last Measured. Raises InputError on bad
-    input and ConvergenceError (with everything accepted on disk) when the end asked for cannot be reached.
+    every accepted step leaves, on any number of ranks. milestones: pressures (MPa; mm3 or mm under another control) that are hit
+    exactly; on_measured(Measured) sees every accepted state. Returns the last Measured. Raises InputError on bad input and
+    ConvergenceError (with everything accepted on disk) when the end asked for cannot be reached.
     """
     directory, out = Path(directory), Path(directory) / "solve"
     goal = Goal.of(design, pressure)
@@ -111,6 +123,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
                 say(goal.progress(m, solve.stage, (solve.path.parameter - start) / (goal.end(solve.stage, target) - start), breaks_at))
             for point in news:
                 say(limit_text(point))
+        on_measured(m)
 
     complete = before and goal.is_last(solve.stage) and before.load >= (1 - 1e-12) * goal.end(solve.stage, target)
     if complete:
@@ -125,7 +138,7 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
     status, result, failure = f"reached the {goal.noun} asked for", StepResult(), None
     try:
         if not complete:
-            result = solve.run(target, keep, before=before, control=goal.control)
+            result = solve.run(target, keep, milestones, before=before, control=goal.control)
     except KeyboardInterrupt:
         record("interrupted")
         say(f"interrupted at {goal.where(solve.stage, solve.path.parameter)}; the result up to there is in {out}")
