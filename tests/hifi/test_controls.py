@@ -47,7 +47,7 @@ def named(path):
 
 def test_arc_length_follows_the_sphere_through_its_limit_point(sphere):
     path, seen = EquilibriumPath(sphere, ArcLength(sphere)), []
-    run_steps(path, 0.8, StepSize(0.01, 1e-5, 0.1), lambda step: seen.append((sphere.volume(), sphere.load)))
+    run_steps(path, 0.9, StepSize(0.01, 1e-5, 0.1), lambda step: seen.append((sphere.volume(), sphere.load)))
     volumes, pressures = np.array(seen).T
     radii = (6 * volumes / np.pi) ** (1 / 3)
     assert radii[-1] > 2.1 and (np.diff(radii) > 0).all()
@@ -76,7 +76,7 @@ def half_chevron():
 
 def test_arc_length_follows_an_arch_that_snaps_through(shared_directory):
     """A dead force on the middle: it rises, falls and rises again. Pushing the middle down step by step takes the same forces but
-    for an end effect, 2 % of the top and 8 % on the last branch, where strips are stretched: the pushed face keeps its height."""
+    for an end effect, some 4 % of the largest: the pushed face may not deform in its plane, where the strips bend most."""
     mesh = bodies.build(shared_directory, "arch", 1.5, half_chevron, lambda box: bodies.strip_faces(box, HALF_SPAN))
     clamp, plane = Support(bodies.PLANE_X), Support(bodies.END, 0)
 
@@ -101,4 +101,4 @@ def test_arc_length_follows_an_arch_that_snaps_through(shared_directory):
     assert (top.kind, bottom.kind) == ("maximum", "minimum") and bottom.load < 0.5 * top.load
     ways, loads = np.array(seen).T
     assert ways[-1] > 1.5 * RISE
-    assert loads == pytest.approx(CubicSpline(depths, forces)(ways), rel=0.08, abs=0.02 * top.load)
+    assert loads == pytest.approx(CubicSpline(depths, forces)(ways), rel=0.08, abs=0.05 * top.load)
