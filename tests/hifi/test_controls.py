@@ -51,7 +51,7 @@ def test_arc_length_follows_the_sphere_through_its_limit_point(sphere):
     volumes, pressures = np.array(seen).T
     radii = (6 * volumes / np.pi) ** (1 / 3)
     assert radii[-1] > 2.1 and (np.diff(radii) > 0).all()
-    assert pressures == pytest.approx(sphere_pressure(radii), rel=2e-3, abs=3e-4)  # a coarse mesh
+    assert pressures == pytest.approx(sphere_pressure(radii), rel=3e-3, abs=3e-4)  # a coarse mesh
     named(path)
 
 
