@@ -69,6 +69,13 @@ def number(value, key, where, integer=False):
     return value
 
 
+def vector(value, key, where):
+    """Three finite numbers as a tuple of floats, or an InputError naming the key."""
+    if not isinstance(value, (list, tuple)) or len(value) != 3:
+        raise InputError(f"{where}: '{key}' must be three numbers, [x, y, z], not {value!r}")
+    return tuple(float(number(v, key, where)) for v in value)
+
+
 def from_table(cls, table, where, **preset):
     """An instance of dataclass `cls` from a TOML table; fields without `unit` metadata come in by `preset`."""
     fields = {file_key(f): f for f in dataclasses.fields(cls) if "unit" in f.metadata}
@@ -84,6 +91,8 @@ def from_table(cls, table, where, **preset):
             value = number(value, key, where) * TO_INTERNAL.get(field.metadata["unit"], 1.0)
         elif field.type in (int, "int"):
             value = number(value, key, where, integer=True)
+        elif field.type in (tuple, "tuple"):
+            value = tuple(v * TO_INTERNAL.get(field.metadata["unit"], 1.0) for v in vector(value, key, where))
         elif field.type in (str, "str") and not isinstance(value, str):
             raise InputError(f"{where}: '{key}' must be text in quotes, not {value!r}")
         values[field.name] = value
@@ -102,13 +111,19 @@ def to_table(instance):
     for field in dataclasses.fields(instance):
         if "unit" not in field.metadata:
             continue
-        value = getattr(instance, field.name)
+        value, factor = getattr(instance, field.name), TO_INTERNAL.get(field.metadata["unit"], 1.0)
         if isinstance(value, float):
             if math.isinf(value):
                 continue
-            value = float(f"{value / TO_INTERNAL.get(field.metadata['unit'], 1.0):.12g}")
+            value = _rounded(value / factor)
+        elif isinstance(value, tuple):
+            value = [_rounded(v / factor) for v in value]
         table[file_key(field)] = value
     return table
+
+
+def _rounded(value):
+    return float(f"{value:.12g}")
 
 
 def _value(value):

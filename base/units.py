@@ -16,5 +16,8 @@ TO_INTERNAL = {
     "percent": 0.01,
     "rad_per_mm": 1.0,
     "per_m": PER_MM_PER_M,
+    "m_per_s2": 1e3,
+    "N": 1.0,
+    "N_mm": 1.0,
     "rad_per_m": PER_MM_PER_M,
 }

@@ -50,10 +50,11 @@ class Comparison:
         nearest = None
         if run.stale:
             notes.append(
-                "The finite element solution in this folder is of another body: its dimensions or materials are not those of "
-                "design.toml. It is not shown; run pneunet solve again."
+                "The finite element solution in this folder is of another body: its dimensions, materials or loads are not those "
+                "of design.toml. It is not shown; run pneunet solve again."
             )
         if run.solve is not None:
+            notes += _loading(run)
             if run.target is not None:
                 nearest = _nearest(run)
             solved = se3.transform(design.base_pose, smooth(run.solve.s, run.solve.points))
@@ -79,6 +80,21 @@ class Comparison:
             tuple(dict.fromkeys(notes)),
             nearest,
         )
+
+
+def _loading(run):
+    """Sentences on what acted in the finite elements beside a growing pressure."""
+    record, notes = run.solve.record, []
+    if run.design.loads:
+        notes.append(f"Dead loads act in the finite elements, {run.design.loads.text()}; the reduced model knows none.")
+    if record.get("control", "pressure") != "pressure":
+        notes.append(f"The finite elements were walked by {record['control']}: their last pressure is not one that was asked for.")
+    for point in record.get("limit_points", []):
+        notes.append(
+            f"The pressure has a limit point ({point['kind']}) of {plain(point['pressure_kPa'])} kPa at a cavity volume of "
+            f"{point['volume_mm3']:.4g} mm3: a body on a pressure source jumps there."
+        )
+    return notes
 
 
 def smooth(s, points, spacing=1.0):
@@ -144,7 +160,8 @@ def verdict(run, comparison):
         sentence += f"; the finite element body misses the target by {_mm(c.solved_target)}"
     if stopped_short(run):
         asked = run.solve.record.get("pressure_kPa", design.pressure * 1e3)
-        reason = "was asked for less than" if asked < design.pressure * 1e3 * (1 - 1e-6) else "stopped short of"
+        walked = run.solve.record.get("control", "pressure") != "pressure"
+        reason = "ends below" if walked else "was asked for less than" if asked < design.pressure * 1e3 * (1 - 1e-6) else "stopped short of"
         sentence += f"; it {reason} the design pressure, {plain(design.pressure * 1e3)} kPa"
     if c.nearest and c.nearest[0] < run.solve.pressure:
         sentence += f". Its step nearest to the target is at {plain(c.nearest[0] * 1e3)} kPa, with {_mm(c.nearest[1])}"

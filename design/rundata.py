@@ -51,7 +51,7 @@ class Solve:
 @dataclass(frozen=True)
 class Run:
     """directory; design; target (n, 3) and centreline (s (m,), points (m, 3)) in target coordinates; mesh, record: the
-    JSON files; solve; stale: the folder holds a solution of another body than design.toml's, which is left out."""
+    JSON files; solve; stale: the folder holds a solution of another body, or under other loads, than design.toml's, which is left out."""
 
     directory: Path
     design: Design
@@ -72,7 +72,8 @@ def read_run(directory):
     centreline = directory / "centreline.csv"
     columns = read_columns(centreline, ["s_mm", *POINTS]) if centreline.is_file() else None
     design, solve = read_design(directory / "design.toml"), _solve(directory / "solve")
-    stale = solve is not None and solve.record.get("body", body_tables(design.manipulator)) != body_tables(design.manipulator)
+    ours = {"body": body_tables(design.manipulator), "loads": design.loads.table()}
+    stale = solve is not None and any(solve.record.get(name, value) != value for name, value in ours.items())
     return Run(
         directory,
         design,
@@ -100,7 +101,7 @@ def _solve(directory):
     if not (directory / "steps.csv").is_file():
         return None
     table = read_columns(directory / "steps.csv", STEP_COLUMNS)
-    if not len(table) or table[-1, 1] == 0:
+    if len(table) < 2:
         return None
     last = table[-1, 0]
     centrelines = read_columns(directory / "centrelines.csv", ["step", "s_mm", *POINTS])
@@ -114,7 +115,7 @@ def _solve(directory):
         s=centreline[:, 1],
         points=centreline[:, 2:],
         strains=RodStrains(strains[:, 1:4], strains[:, 4:7]),
-        history=[(row[1] * 1e-3, *_step(centrelines, row[0])) for row in table if row[1] > 0],
+        history=[(row[1] * 1e-3, *_step(centrelines, row[0])) for row in table[1:]],
         walls=_walls(directory / "walls.csv"),
         solution=solution if solution.is_file() else None,
         record=_json(directory / "run.json"),

@@ -1,6 +1,6 @@
 """design.toml: a manipulator, its pressure and where its base stands, complete and re-runnable."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
@@ -8,9 +8,14 @@ from base.errors import InputError
 from base.files import write_text
 from base.materials import material_from_table, material_to_table
 from base.tables import as_table, from_table, number, read_toml, refuse_unknown, to_table, toml_text
+from geometry.loading import CONTROL_KEYS, Control, DeadLoads, Extras, read_control, read_extras
 from geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
+KEYS = [
+    *("schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "layer_material", "segment", "base", "result"),
+    *("loads", "measure", *CONTROL_KEYS),
+]
 
 
 @dataclass(frozen=True)
@@ -18,7 +23,8 @@ class Design:
     """What the commands mesh, shape and solve read.
 
     pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm; target: text
-    that names the target file; result: free table of numbers that `pneunet design` adds and nobody reads back.
+    that names the target file; result: free table of numbers that `pneunet design` adds and nobody reads back. loads,
+    control and measure are for the finite elements alone; a pressure of 0 goes with loads only.
     """
 
     manipulator: Manipulator
@@ -28,24 +34,26 @@ class Design:
     mesh_size: float = 2.0
     target: str = ""
     result: dict = field(default_factory=dict)
+    loads: DeadLoads = DeadLoads()
+    control: Control = Control()
+    measure: Extras = Extras()
 
 
 def read_design(path):
     """The Design in a TOML file; InputError with file, table and key otherwise."""
     data = read_toml(path)
-    refuse_unknown(
-        data,
-        ["schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "layer_material", "segment", "base", "result"],
-        str(path),
-    )
+    refuse_unknown(data, KEYS, str(path))
     if data.get("schema", SCHEMA) != SCHEMA:
         raise InputError(f"{path}: schema = '{data['schema']}' is not '{SCHEMA}'")
     for key in ("pressure_kPa", "material", "segment"):
         if key not in data:
             raise InputError(f"{path}: key '{key}' is missing")
     pressure = number(data["pressure_kPa"], "pressure_kPa", str(path))
-    if not 0 < pressure <= 2000:
+    loads = from_table(DeadLoads, as_table(data.get("loads", {}), f"{path} [loads]"), f"{path} [loads]")
+    if not 0 <= pressure <= 2000:
         raise InputError(f"{path}: pressure_kPa = {pressure:g} must lie in 0..2000 kPa")
+    if pressure == 0 and not loads:
+        raise InputError(f"{path}: pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads]")
     mesh_size = number(data.get("mesh_size_mm", 2.0), "mesh_size_mm", str(path))
     if not 0.1 <= mesh_size <= 20:
         raise InputError(f"{path}: mesh_size_mm = {mesh_size:g} must lie in 0.1..20 mm")
@@ -76,6 +84,9 @@ def read_design(path):
         mesh_size=float(mesh_size),
         target=str(data.get("target", "")),
         result=as_table(data.get("result", {}), f"{path} [result]"),
+        loads=loads,
+        control=read_control(data, str(path)),
+        measure=read_extras(data.get("measure", {}), f"{path} [measure]"),
     )
 
 
@@ -114,11 +125,16 @@ def design_tables(design):
         "pressure_kPa": float(f"{design.pressure * 1e3:.12g}"),
         "mesh_size_mm": design.mesh_size,
     }
+    tables |= design.control.table()
     if design.target:
         tables["target"] = design.target
     tables["material"] = material_to_table(first)
     tables["segment"] = rows
     tables["base"] = {"origin_mm": design.base_pose[:3, 3], "rotation": design.base_pose[:3, :3]}
+    if design.loads:
+        tables["loads"] = design.loads.table()
+    if any(asdict(design.measure).values()):
+        tables["measure"] = asdict(design.measure)
     if design.result:
         tables["result"] = design.result
     return tables

@@ -38,6 +38,10 @@ class BodySystem:
         self._load = value
         self.apply_load(value)
 
+    def steer(self, apply_load, load):
+        """From here on the load is what `apply_load` sets, and begins at `load`; what was set before stays."""
+        self.apply_load, self.load = apply_load, load
+
     def at_supports(self, state):
         """`state` with supported displacements at their values for the present load."""
         return self.problem.supported(state, self._load)

@@ -11,11 +11,11 @@ stiffness keeps its inner nodes in place. Serial: designs are spread over ranks,
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.csgraph
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from geometry import cad
@@ -186,7 +186,7 @@ def _same_modulo(points, pitch, tolerance=1e-5):
     wrapped[:, 1:] -= wrapped[:, 1:].min(axis=0)  # the tree's box starts at zero
     pairs = cKDTree(wrapped, boxsize=[pitch, *(2 * far[1:])]).query_pairs(tolerance, output_type="ndarray")
     graph = sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, labels = sp.csgraph.connected_components(graph, directed=False)
+    _, labels = csgraph.connected_components(graph, directed=False)
     first = np.full(labels.max() + 1, len(points))
     np.minimum.at(first, labels, np.arange(len(points)))
     return first[labels]

@@ -18,9 +18,9 @@ from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
 from hifi.control import LoadControl, VolumeControl
 from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath
+from hifi.results import KPA, limit_table, limit_text
 from hifi.stepping import StepSize, run_steps
 
-KPA = 1e3  # kPa per MPa
 STRAINS = ("e1", "e2", "e3", "k1_per_mm", "k2_per_mm", "k3_per_mm")
 CONTROLS = ("pressure", "volume")
 
@@ -77,10 +77,11 @@ def read_cell(path):
     return CellCase(segment, pressure, float(mesh_size), levels, held, control, float(volume_factor))
 
 
-def solve_cell(case, mesh_path, on_state=lambda state: None):
+def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lambda point: None):
     """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns (last CellState, mesh facts).
 
-    ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
+    on_limit_point(hifi.path.LimitPoint): told when the pressure has passed one. ConvergenceError when the path ends short; what
+    was recorded before has been seen by `on_state`.
     """
     facts = mesh_cell(case.segment, case.mesh_size, mesh_path)
     problem = CellProblem(case.segment, mesh_path)
@@ -99,7 +100,13 @@ def solve_cell(case, mesh_path, on_state=lambda state: None):
         marks = tuple(np.linspace(start, target, case.levels + 1)[1:])
         path = EquilibriumPath(system, control, options, start)
 
+        passed = 0
+
         def keep(step):
+            nonlocal passed
+            for point in path.limit_points[passed:]:
+                on_limit_point(point)
+            passed = len(path.limit_points)
             if step.load in marks:
                 last[:] = [system.measure()]
                 on_state(last[0])
@@ -123,8 +130,12 @@ def _hold(problem, free, case, options):
         change[i] = value - start[i]
     system = CellSystem(problem, held, (case.pressure, 0.0), (start, change))
     system.state = free.state.copy()
+    try:
+        run_steps(EquilibriumPath(system, LoadControl(), options), 1.0, StepSize(0.25, 1e-3))
+    except BaseException:
+        system.destroy()
+        raise
     free.destroy()
-    run_steps(EquilibriumPath(system, LoadControl(), options), 1.0, StepSize(0.25, 1e-3))
     return system
 
 
@@ -140,7 +151,11 @@ def run_cell(path, directory, say=print):
     """`pneunet cell`: solve CELL.toml; directory/cell gets cell.csv (a row a level), cell.msh and run.json."""
     case = read_cell(path)
     out = output_directory(Path(directory)) / "cell"
-    rows, started = [], time.perf_counter()
+    rows, limit_points, started = [], [], time.perf_counter()
+
+    def name(point):
+        limit_points.append(limit_table(point))
+        say(limit_text(point))
 
     def keep(state):
         e, k = state.strains.e, state.strains.k
@@ -156,7 +171,7 @@ def run_cell(path, directory, say=print):
 
     status, facts = "reached what was asked for", {}
     try:
-        _, facts = solve_cell(case, out / "cell.msh", keep)
+        _, facts = solve_cell(case, out / "cell.msh", keep, name)
     except ConvergenceError as error:
         status = str(error)
     write_record(
@@ -164,6 +179,7 @@ def run_cell(path, directory, say=print):
         status=status,
         segment=to_table(case.segment) | {"material": material_to_table(case.segment.material)},
         control=case.control,
+        limit_points=limit_points,
         mesh={"mesh_size_mm": case.mesh_size, **facts},
         wall_seconds=time.perf_counter() - started,
     )

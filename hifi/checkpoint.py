@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from base.errors import InputError
 from base.files import atomic_path
 from hifi.agreement import on_rank_0
-from hifi.path import PathState
+from hifi.path import LimitPoint, PathState
 from hifi.stepping import Step
 
 NAME = "checkpoint.npz"
@@ -25,17 +25,25 @@ NAME = "checkpoint.npz"
 NEAR = 1e-6
 
 
-def save(directory, path, step, body, mesh_size):
-    """Write the EquilibriumPath of a hifi.body.BodySystem after `step`; collective. OSError on all ranks."""
+def save(directory, path, step, stage, identity):
+    """Write the EquilibriumPath of a hifi.body.BodySystem after `step` of a `stage`; collective. OSError on all ranks.
+
+    identity: {name: JSON value} of what the run is of; `read` compares it.
+    """
     problem, newton = path.system.problem, path.newton
     factorised = [newton.factorised_at] if newton.current else []
     states = [a.state for a in path.accepted] + [state for state, _ in factorised]
     content = {
-        "belongs_to": _identity(body, mesh_size),
+        "belongs_to": _text(identity),
+        "stage": stage,
         "step": np.array(astuple(step), float),
         "parameter": np.array([a.parameter for a in path.accepted]),
         "load": np.array([a.load for a in path.accepted] + [load for _, load in factorised]),
+        "volume": np.array([a.volume for a in path.accepted]),
         "trusted": np.array(path.trusted),
+        "first_compliance": np.array(path.first_compliance),
+        "limit_points": np.array([[p.load, p.volume, p.kind == "maximum"] for p in path.limit_points]).reshape(-1, 3),
+        "timings": np.array(list(newton.timings.values())),
     }
     for name, dofs, nodes, owned in _fields(problem):
         X = _gather(problem.mesh.comm, nodes[:owned])
@@ -53,8 +61,8 @@ def save(directory, path, step, body, mesh_size):
     on_rank_0(problem.mesh.comm, write)
 
 
-def read(directory, body, mesh_size, pressure):
-    """{name: array} of the checkpoint in `directory`, None without one; InputError when it is another body's or pressure's."""
+def read(directory, identity):
+    """{name: array} of the checkpoint in `directory`, None without one; InputError when it is of something else than `identity`."""
     path = Path(directory) / NAME
     try:
         with np.load(path, allow_pickle=False) as stored:
@@ -63,14 +71,13 @@ def read(directory, body, mesh_size, pressure):
         return None
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: cannot be read ({error}): solve without --resume") from None
-    theirs, ours = json.loads(str(content["belongs_to"])), json.loads(_identity(body, mesh_size))
-    if theirs["mesh_size_mm"] != ours["mesh_size_mm"]:
-        raise InputError(f"{path}: mesh_size_mm is {theirs['mesh_size_mm']:g} there: add --mesh-size-mm {theirs['mesh_size_mm']:g}")
-    if theirs != ours:
-        raise InputError(f"{path}: belongs to another body than the design's: solve without --resume")
-    reached = content["parameter"][-1]
-    if reached > pressure * (1 + 1e-12):
-        raise InputError(f"{path}: has passed pressure_kPa = {pressure * 1e3:g}, it stands at {reached * 1e3:g}: solve without --resume")
+    theirs, ours = json.loads(str(content["belongs_to"])), json.loads(_text(identity))
+    size = theirs["mesh_size_mm"]
+    if size != ours["mesh_size_mm"]:
+        raise InputError(f"{path}: mesh_size_mm is {size:g} there: add --mesh-size-mm {size:g}")
+    for name, value in ours.items():
+        if theirs.get(name) != value:
+            raise InputError(f"{path}: belongs to another {name} than the design's: solve without --resume")
     return content
 
 
@@ -88,15 +95,18 @@ def restore(content, path):
     if furthest > NEAR or not sizes:
         raise InputError(f"{NAME}: belongs to another mesh (a node is {furthest:.1e} mm away): solve without --resume")
     loads, parameters = content["load"].tolist(), content["parameter"].tolist()
-    accepted = [PathState(*each) for each in zip(parameters, loads, states)]
+    accepted = [PathState(*each) for each in zip(parameters, loads, states, content["volume"].tolist())]
     factorised_at = (states[-1], loads[-1]) if len(states) > len(accepted) else None
     path.resume(accepted, float(content["trusted"]), factorised_at)
+    path.first_compliance = float(content["first_compliance"])
+    path.limit_points = [LimitPoint(p, v, "maximum" if top else "minimum") for p, v, top in content["limit_points"].tolist()]
+    path.newton.timings = dict(zip(path.newton.timings, content["timings"].tolist()))
     number, load, iterations, factorisations, *rest = content["step"].tolist()
     return Step(int(number), load, int(iterations), int(factorisations), *rest)
 
 
-def _identity(body, mesh_size):
-    return json.dumps({"body": body, "mesh_size_mm": mesh_size}, default=float, sort_keys=True)
+def _text(identity):
+    return json.dumps(identity, default=float, sort_keys=True)
 
 
 def _fields(problem):

@@ -88,7 +88,5 @@ class EndLoad:
 
     def update(self, problem):
         """Refer the traction to the face's present centre and second moments."""
-        area, centre, second = self._face.moments(problem.nodes + problem.displacement())
-        self._even.value[:] = self.force / area
-        self._centre.value[:] = centre
-        self._spin.value[:] = np.linalg.solve(np.trace(second) * np.eye(3) - second, self.moment) if self.moment.any() else 0.0
+        traction = self._face.traction(problem.nodes + problem.displacement(), self.force, self.moment)
+        self._even.value[:], self._spin.value[:], self._centre.value[:] = traction

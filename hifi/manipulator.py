@@ -1,43 +1,38 @@
-"""Solve a whole manipulator, clamped at its base, under one growing cavity pressure."""
+"""A whole manipulator, clamped at its base, under dead loads and one cavity pressure."""
 
-import json
-import time
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 
 from base import se3
-from base.errors import ConvergenceError, InputError
-from base.files import output_directory
-from base.record import write_record
 from geometry import cad
-from geometry.designfile import body_tables
-from hifi import checkpoint, compat
-from hifi.agreement import on_rank_0
+from geometry.loading import DeadLoads
+from hifi import compat
 from hifi.body import BodySystem
-from hifi.control import LoadControl
-from hifi.loads import Pressure
-from hifi.output import FieldWriter
+from hifi.control import ArcLength, LoadControl, VolumeControl
+from hifi.loads import EndLoad, Gravity, Pressure
 from hifi.path import EquilibriumPath
 from hifi.problem import MixedProblem, Support
-from hifi.results import KPA, ResultFiles
 from hifi.rod_coordinates import RodCoordinates
 from hifi.sections import SectionFrames
-from hifi.stepping import StepSize, run_steps
+from hifi.stepping import StepResult, StepSize, run_steps
 from hifi.stretch import PrincipalStretch
 from hifi.walls import WallDistances
 
 #: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how far they strain
 TURN_PER_STEP = 2.0
+#: the first stage of a path; the others are called after the control (geometry.loading.CONTROLS)
+DEAD_LOADS = "dead loads"
 
 
 @dataclass(frozen=True)
 class Measured:
     """One accepted state, the same on all ranks but for `walls` (rank 0 only). Pressure in MPa, lengths in mm.
 
-    unstable: unstable directions at fixed pressure of the tangent factorised last, in this step or before.
+    dead_loads: the fraction of them that acts. unstable: unstable directions at fixed loads of the tangent factorised last: at
+    this very state if stability_factorisations is 1, in this step or before otherwise. limit_points: hifi.path.LimitPoints of
+    the pressure passed so far.
     """
 
     step: int
@@ -52,40 +47,66 @@ class Measured:
     strains: object
     walls: np.ndarray | None
     unstable: int
+    dead_loads: float
+    stability_factorisations: int
+    limit_points: tuple
 
 
 class ManipulatorSolve:
     """The boundary value problem of a meshed manipulator with everything that is measured on it."""
 
-    def __init__(self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False):
-        """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh."""
-        self.manipulator, self.comm = manipulator, comm
+    def __init__(self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False, loads=None, hold_tip=False):
+        """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh. loads:
+        geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at rest."""
+        self.manipulator, self.comm, self.newton_options = manipulator, comm, newton_options
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
         if flip_y:
             mesh.geometry.x[:, 1] *= -1
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
         materials |= {cad.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness}
         self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
-        self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, [Support(cad.BASE)], [self.pressure])
+        self.dead = _dead(loads or DeadLoads(), materials)
+        supports = [Support(cad.BASE)] + [Support(cad.TIP)] * hold_tip
+        self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, supports, [self.pressure, *self.dead])
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
         coordinates = RodCoordinates(self.problem.nodes, self.problem.owned_nodes, comm, spacing)
-        self.system = BodySystem(self.problem, coordinates, self._apply)
-        self.path = EquilibriumPath(self.system, LoadControl(), newton_options)
+        self.system = BodySystem(self.problem, coordinates, self._set_pressure)
         self.sections = SectionFrames(self.problem, manipulator)
         self.walls = WallDistances(self.problem, manipulator)
         self.stretch = PrincipalStretch(self.problem)
         #: hifi.stepping.Step of the last accepted state
         self.last_step = None
+        self.stability_factorisations, self.rest_volume, self.path = 0, self.system.volume(), None
+        self.begin(DEAD_LOADS if self.dead else "pressure")
 
-    def _apply(self, load):
-        self.pressure.value.value = load
+    # ---- the stages of loading: what the one load factor of the system means
+    def _set_pressure(self, value):
+        self.pressure.value.value = value
 
-    def measure(self, step=None):
+    def _set_dead(self, fraction):
+        for load in self.dead:
+            load.value.value = fraction
+
+    def begin(self, stage):
+        """From the present state on, walk along `stage`: DEAD_LOADS from none to all, or inflate under the control so called."""
+        if stage == DEAD_LOADS:
+            self.system.steer(self._set_dead, 0.0)
+        else:
+            self._set_dead(1.0)
+            self.system.steer(self._set_pressure, float(self.pressure.value.value))
+        control = {"volume": VolumeControl, "arc length": lambda: ArcLength(self.system)}.get(stage, LoadControl)()
+        start = {"volume": self.system.volume(), "arc length": 0.0}.get(stage, self.system.load)
+        before, self.stage = self.path, stage
+        self.path = EquilibriumPath(self.system, control, self.newton_options, start)
+        if before:
+            self.path.newton.timings = before.newton.timings
+
+    def measure(self, step=None, stability_factorisations=0):
         """Measured of the current state; collective."""
         frames = self.sections.frames()
         return Measured(
             step=step.number if step else 0,
-            pressure=self.path.parameter,
+            pressure=float(self.pressure.value.value),
             iterations=step.iterations if step else 0,
             factorisations=step.factorisations if step else 0,
             seconds=step.seconds if step else 0.0,
@@ -96,35 +117,72 @@ class ManipulatorSolve:
             strains=self.sections.segment_strains(frames),
             walls=self.walls.distances(),
             unstable=self.system.unstable,
+            dead_loads=float(self.dead[0].value.value) if self.dead else 0.0,
+            stability_factorisations=stability_factorisations,
+            limit_points=tuple(self.path.limit_points),
         )
 
-    def run(self, pressure, on_measured=lambda measured: None, milestones=(), first_step=None, before=None):
-        """Step to `pressure` (MPa); `on_measured` sees every accepted state. ConvergenceError when it stops short.
+    def run(
+        self,
+        target,
+        on_measured=lambda measured: None,
+        milestones=(),
+        first_step=None,
+        before=None,
+        control="pressure",
+        stability=True,
+    ):
+        """The dead loads, if there are any, in a ramp of their own; then inflate to `target`; a StepResult of the latter.
 
-        `before`: the Step that this run goes on from (hifi.checkpoint).
+        control: 'pressure' with a target in MPa (0: no inflation), 'volume' with one in mm3, 'arc length' with one in mm.
+        `on_measured` sees every accepted state. stability: the tangent is factorised at the end of either stage and at
+        every milestone, to count unstable directions there (counted apart from the stepper's own factorisations).
+        ConvergenceError when it stops short. `before`: the Step that this run goes on from (hifi.checkpoint).
         """
-        softest = min(s.material.mu for s in self.manipulator.segments)
-        size = StepSize(
-            first=min(first_step or 0.01 * softest, pressure),
-            smallest=1e-5 * softest,
-            largest=0.05 * softest,
-            milestones=tuple(milestones),
-        )
+        if self.stage == DEAD_LOADS:
+            result = StepResult()
+            if self.path.parameter < 1.0:
+                result = self._walk(1.0, StepSize(0.1, 1e-4, 0.5), on_measured, before, stability)
+            if target == 0 and control == "pressure":
+                return result
+            before = None
+        if self.stage != control:
+            self.begin(control)
+        if self.last_step and not before:  # numbers and seconds go on after the dead loads
+            before = replace(self.last_step, next_size=self._step_size(target, first_step).first)
+        size = self._step_size(target, first_step)
+        size.milestones = tuple(milestones)
+        return self._walk(target, size, on_measured, before, stability)
+
+    def _step_size(self, target, first_step):
+        """StepSize of the inflation."""
+        if self.stage == "pressure":
+            softest = min(s.material.mu for s in self.manipulator.segments)
+            return StepSize(first=min(first_step or 0.01 * softest, target), smallest=1e-5 * softest, largest=0.05 * softest)
+        way = target - (self.rest_volume if self.stage == "volume" else 0.0)
+        return StepSize(first=first_step or 0.02 * way, smallest=1e-5 * way, largest=0.1 * way)
+
+    def _walk(self, target, size, on_measured, before, stability):
+        largest, marks = size.largest, {*size.milestones, target}
 
         def limit():
             if len(self.path.accepted) > 1:
-                size.largest = min(0.05 * softest, TURN_PER_STEP / self._turn_per_load(*self.path.accepted[-2:]))
+                size.largest = min(largest, TURN_PER_STEP / self._turn_per_parameter(*self.path.accepted[-2:]))
 
         def on_step(step):
             self.last_step = step
             limit()
-            on_measured(self.measure(step))
+            count = int(stability and step.load in marks)
+            if count:
+                self.path.newton.factorise()
+                self.stability_factorisations += 1
+            on_measured(self.measure(step, count))
 
         limit()
-        return run_steps(self.path, pressure, size, on_step, before)
+        return run_steps(self.path, target, size, on_step, before)
 
-    def _turn_per_load(self, first, second):
-        """Sum over the stations of how far each section turns against the one before, rad per MPa between two PathStates."""
+    def _turn_per_parameter(self, first, second):
+        """Sum over the stations of how far each section turns against the one before, rad per parameter, of two PathStates."""
         relative = []
         for accepted in (first, second):
             rotations = self.sections.frames(accepted.state)[:, :3, :3]
@@ -136,178 +194,7 @@ class ManipulatorSolve:
         self.system.destroy()
 
 
-def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, comm=MPI.COMM_WORLD, say=print, resume=False):
-    """Mesh (if not there yet) and solve a geometry.designfile.Design; files in directory/mesh and directory/solve.
-
-    mesh_size in mm and pressure in MPa override the design's. `resume` goes on from directory/solve/checkpoint.npz, which
-    every accepted step leaves, on any number of ranks. Returns the last Measured. Raises InputError on bad
-    input and ConvergenceError (with everything accepted on disk) when the pressure cannot be reached.
-    """
-    directory = Path(directory)
-    pressure = pressure or design.pressure
-    mesh_size = mesh_size or design.mesh_size
-    say = say if comm.rank == 0 else (lambda text: None)
-    started = time.perf_counter()
-    facts, kept = on_rank_0(comm, lambda: _prepare(design, directory, mesh_size, pressure, resume, say))
-    solve = ManipulatorSolve(design.manipulator, directory / "mesh" / "manipulator.msh", comm)
-    out = directory / "solve"
-    files = ResultFiles(out, solve.walls.gaps)
-    writer = FieldWriter(out, solve.problem, solve.stretch) if fields else None
-    say(
-        f"solve: {facts['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size} rank{'s' * (comm.size > 1)}, "
-        f"0..{pressure * KPA:g} kPa; set up in {time.perf_counter() - started:.1f} s"
-    )
-    breaks_at = break_stretch(design.manipulator)
-    body = body_tables(design.manipulator)
-    last, history, before = [], [], None
-    if kept:
-        before = solve.last_step = checkpoint.restore(kept, solve.path)
-        last[:] = [solve.measure(before)]
-        if before.load >= pressure:
-            say(f"complete: the run in {out} has reached {before.load * KPA:g} kPa; there is nothing to resume")
-            solve.destroy()
-            return last[0]
-        say(f"resumed after step {before.number} at {before.load * KPA:.4g} kPa")
-        history = _written(comm, out, lambda: (files.keep(before.number), files.history())[1])
-        if writer:
-            _written(comm, out, lambda: writer.keep([(row["step"], row["pressure_kPa"]) for row in history]))
-
-    def record(status, failures=()):
-        if comm.rank == 0:
-            write_record(
-                out,
-                status=status,
-                pressure_kPa=pressure * KPA,
-                pressure_reached_kPa=last[0].pressure * KPA,
-                body=body,
-                mesh=facts,
-                cells=facts["cells"],
-                dofs=solve.problem.dofs,
-                ranks=comm.size,
-                mesh_size_mm=facts["mesh_size_mm"],
-                wall_seconds=time.perf_counter() - started,
-                largest_stretch=last[0].largest_stretch,
-                stretch_at_break=breaks_at if np.isfinite(breaks_at) else None,
-                timings=solve.path.newton.timings,
-                newton=vars(solve.path.newton.options),
-                versions=versions(),
-                failed_attempts=[[load * KPA, why] for load, why in failures],
-                steps=history,
-            )
-
-    def keep(m):
-        try:
-            write(m)
-        except OSError as error:
-            raise _unwritable(out, error) from None
-
-    def write(m):
-        last[:] = [m]
-        if writer:
-            writer.write(m.step, m.pressure * KPA)
-        history.append(
-            {
-                "step": m.step,
-                "pressure_kPa": m.pressure * KPA,
-                "iterations": m.iterations,
-                "factorisations": m.factorisations,
-            }
-        )
-        on_rank_0(comm, lambda: (files.add(m), record("running, or ended by force")) and None)
-        if m.step:  # last: what a checkpoint refers to is on disk
-            checkpoint.save(out, solve.path, solve.last_step, body, mesh_size)
-            if comm.rank == 0:
-                say(_progress(m, pressure, breaks_at))
-
-    if not before:
-        keep(solve.measure())
-    status, failure, result = "reached the pressure asked for", None, None
-    try:
-        result = solve.run(pressure, keep, before=before)
-    except KeyboardInterrupt:
-        record("interrupted")
-        say(f"interrupted at {last[0].pressure * KPA:.4g} kPa; the result up to there is in {out}")
-        raise
-    except ConvergenceError as error:
-        failure, result = error, error.result
-        status = f"stopped at {last[0].pressure * KPA:.4g} kPa of {pressure * KPA:g} kPa: {result.reason}"
-    _written(comm, out, lambda: record(status, result.failures))
-    solve.destroy()
-    if failure:
-        raise ConvergenceError(
-            f"pressure_kPa = {pressure * KPA:g} was not reached: stopped at {last[0].pressure * KPA:.4g} kPa ({result.reason}), "
-            f"usually by ballooning, touching walls or too coarse a mesh; the result up to there is in {out}; "
-            "try less pressure, thicker walls or a smaller mesh_size_mm"
-        )
-    return last[0]
-
-
-def versions():
-    """Versions of what computed the result."""
-    import petsc4py
-
-    return {
-        "dolfinx": compat.VERSION,
-        "petsc4py": petsc4py.__version__,
-        "mpi": MPI.Get_library_version().split(",")[0],
-        "numpy": np.__version__,
-    }
-
-
-def break_stretch(manipulator):
-    """Smallest stretch at which one of the manipulator's materials breaks; inf when none says."""
-    return min(material.break_stretch for material in manipulator.materials)
-
-
-def _progress(m, target, breaks_at):
-    done = m.pressure / target
-    eta = m.seconds / done * (1 - done)
-    nearest = m.walls.min() if len(m.walls) else float("inf")
-    warning = "  WALLS OVERLAP" if nearest < 0 else ""
-    if m.unstable:
-        warning += f"  UNSTABLE in {m.unstable}"
-    if m.largest_stretch > breaks_at:
-        warning += f"  BEYOND BREAK (stretch {breaks_at:.2f})"
-    return (
-        f"step {m.step:3d}  {m.pressure * KPA:7.2f} kPa  {m.iterations:2d} iterations  {m.factorisations} factorisations  "
-        f"stretch {m.largest_stretch:.2f}  wall distance {nearest:.2f} mm  {m.seconds:6.1f} s  ETA {eta:5.0f} s{warning}"
-    )
-
-
-def _unwritable(out, error):
-    return InputError(
-        f"{out}: cannot be written to ({error.strerror or error}): make room there and go on with pneunet solve --resume"
-    )
-
-
-def _written(comm, out, work):
-    """on_rank_0 for work that writes in `out`."""
-    try:
-        return on_rank_0(comm, work)
-    except OSError as error:
-        raise _unwritable(out, error) from None
-
-
-def _prepare(design, directory, mesh_size, pressure, resume, say):
-    """(facts of the mesh, checkpoint to go on from or None); rank 0."""
-    out = output_directory(directory / "solve")
-    for old in out.glob(".*-????????.*"):
-        old.unlink()  # half a file of a killed run
-    kept = checkpoint.read(out, body_tables(design.manipulator), mesh_size, pressure) if resume else None
-    if resume and not kept:
-        say(f"no {checkpoint.NAME} in {out}: starting from the beginning")
-    if not kept:
-        for old in [*out.glob("step_*.vtu"), out / "solution.pvd", out / "run.json", out / checkpoint.NAME]:
-            old.unlink(missing_ok=True)  # of an earlier run, which may have had more steps
-    return _mesh(design, directory, mesh_size, say), kept
-
-
-def _mesh(design, directory, mesh_size, say):
-    from geometry.mesh import mesh_manipulator, segment_tables
-
-    facts_path = directory / "mesh" / "mesh.json"
-    if facts_path.exists() and (directory / "mesh" / "manipulator.msh").exists():
-        facts = json.loads(facts_path.read_text())
-        if facts.get("mesh_size_mm") == mesh_size and facts.get("segments") == segment_tables(design.manipulator):
-            return facts
-    return mesh_manipulator(design.manipulator, mesh_size, directory / "mesh", say)
+def _dead(loads, materials):
+    """hifi.loads of the DeadLoads that are not zero."""
+    dead = [Gravity(materials, loads.gravity)] if any(loads.gravity) else []
+    return dead + [EndLoad(cad.TIP, loads.tip_force, loads.tip_moment)] * any([*loads.tip_force, *loads.tip_moment])

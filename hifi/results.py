@@ -23,7 +23,13 @@ class ResultFiles:
     def history(self):
         """run.json's list of the steps kept."""
         return [
-            {"step": int(row[0]), "pressure_kPa": float(row[1]), "iterations": int(row[2]), "factorisations": int(row[3])}
+            {
+                "step": int(row[0]),
+                "pressure_kPa": float(row[1]),
+                "iterations": int(row[2]),
+                "factorisations": int(row[3]),
+                "stability_factorisations": int(row[-2]),
+            }
             for row in self.steps
         ]
 
@@ -31,7 +37,8 @@ class ResultFiles:
         p = m.pressure * KPA
         nearest = float(m.walls.min()) if len(m.walls) else float("inf")
         tip = m.frames[-1, :3, 3]
-        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip, nearest, m.largest_stretch, m.unstable, m.seconds]
+        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip, nearest, m.largest_stretch, m.unstable]
+        row += [m.dead_loads, m.stability_factorisations, m.seconds]
         self.steps.append(row)
         self.centrelines += [[m.step, p, s, *g[:3, 3]] for s, g in zip(m.stations, m.frames)]
         for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
@@ -39,7 +46,7 @@ class ResultFiles:
         write_csv(
             self.directory / "steps.csv",
             "step pressure_kPa iterations factorisations volume_mm3 tip_x_mm tip_y_mm tip_z_mm smallest_wall_distance_mm "
-            "largest_stretch unstable_directions seconds".split(),
+            "largest_stretch unstable_directions dead_load_fraction stability_factorisations seconds".split(),
             self.steps,
         )
         write_csv(self.directory / "centrelines.csv", "step pressure_kPa s_mm x_mm y_mm z_mm".split(), self.centrelines)
@@ -53,3 +60,13 @@ class ResultFiles:
             "segment side gap gap_mm distance_mm".split(),
             [[*gap, d] for gap, d in zip(self.gaps, m.walls)],
         )
+
+
+def limit_text(point):
+    """A hifi.path.LimitPoint of the pressure in words."""
+    return f"limit point: pressure {point.load * KPA:.4g} kPa ({point.kind}) at volume {point.volume:.4g} mm3"
+
+
+def limit_table(point):
+    """The same for run.json."""
+    return {"pressure_kPa": point.load * KPA, "volume_mm3": point.volume, "kind": point.kind}

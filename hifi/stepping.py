@@ -38,11 +38,12 @@ class Step:
 
 @dataclass
 class StepResult:
-    """Accepted steps, number of failed attempts, and why it ended."""
+    """Accepted steps, failed attempts (load, why), why it ended, and what the path says about that (its diagnosis)."""
 
     steps: list = field(default_factory=list)
     failures: list = field(default_factory=list)
     reason: str = ""
+    diagnosis: str = ""
 
 
 def lagrange_coefficients(known, wanted):
@@ -61,7 +62,8 @@ def run_steps(path, target, size, on_step=lambda step: None, before=None):
     """Drive `path` from its current load to `target`; return a StepResult.
 
     path.parameter, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
-    its last accepted state. `on_step(step)` is called after each accepted step (hooks write results there).
+    its last accepted state, path.diagnosis() -> words on why it cannot go on. `on_step(step)` is called after each accepted
+    step (hooks write results there).
     `before`: the last Step of a run that this one continues; its numbers, seconds and step size go on. Raises
     ConvergenceError, with the StepResult as its `result`, when steps fall below size.smallest.
     """
@@ -84,10 +86,11 @@ def run_steps(path, target, size, on_step=lambda step: None, before=None):
             if not too_far:
                 result.failures.append((load, str(error)))
             if step < size.smallest:
-                result.reason = str(error)
+                result.reason, result.diagnosis = str(error), path.diagnosis()
+                why = result.diagnosis or "a limit point (ballooning), touching walls or a coarse mesh are the usual causes"
                 failure = ConvergenceError(
                     f"stopped at load {path.parameter:.6g}: the next step of {attempted:.2g} did not converge ({error}); "
-                    "results up to there are kept. A limit point (ballooning), touching walls or a coarse mesh are the usual causes"
+                    f"results up to there are kept; {why}"
                 )
                 failure.result = result
                 raise failure from None

@@ -130,3 +130,18 @@ class FaceQuadrature:
         sums = self.comm.allreduce(sums)
         area, centre = sums[0], sums[1:4] / sums[0]
         return area, centre, sums[4:].reshape(3, 3) - area * np.outer(centre, centre)
+
+    def traction(self, positions, force, moment):
+        """(spread, spin, centre), each (3,): the traction spread + spin x (x - centre) has this force (N), and this moment (N mm)
+        about the face's present centre."""
+        area, centre, second = self.moments(positions)
+        spin = np.linalg.solve(np.trace(second) * np.eye(3) - second, moment) if np.any(moment) else np.zeros(3)
+        return np.asarray(force) / area, spin, centre
+
+    def forces(self, positions, spread, spin, centre):
+        """(local nodes, 3) nodal forces in N of the traction spread + spin x (x - centre), MPa; this rank's facets only."""
+        x = np.einsum("qn,fni->fqi", self._shape, positions[self._facets])
+        traction = spread + np.cross(spin, x - centre)
+        out = np.zeros_like(positions)
+        np.add.at(out, self._facets, np.einsum("fq,qn,fqi->fni", self._weights, self._shape, traction))
+        return out

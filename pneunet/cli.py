@@ -40,6 +40,8 @@ def pressures(text):
 
 
 def one_pressure(text):
+    if text.strip() == "0":  # for loads alone
+        return 0.0
     values = pressures(text)
     if len(values) != 1:
         raise argparse.ArgumentTypeError("one number is wanted here")
@@ -97,7 +99,7 @@ def parser():
 
     c = add("solve", run_solve, "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml")
     c.add_argument("design", type=Path)
-    c.add_argument("--pressure-kPa", type=one_pressure, dest="pressure", help="default: the design's")
+    c.add_argument("--pressure-kPa", type=one_pressure, dest="pressure", help="default: the design's; 0: its [loads] alone")
     c.add_argument("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     c.add_argument("--no-fields", action="store_true", help="write no ParaView files")
     c.add_argument("--resume", action="store_true", help="go on from the last accepted step of a run that was ended, on any ranks")
@@ -162,11 +164,9 @@ def run_solve(a):
     from geometry.designfile import read_design
 
     design = read_design(a.design)
-    from hifi.manipulator import solve_design
+    from hifi.manipulator_run import solve_design
 
-    last = solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume)
-    if last.walls is not None:
-        say(f"done: {last.pressure * 1e3:g} kPa; results in {design_folder(a) / 'solve'}")
+    solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume)
 
 
 def run_cell(a):

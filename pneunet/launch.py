@@ -88,5 +88,6 @@ def run(ranks: int, command: list[str]) -> int:
     code = code if code >= 0 else 128 - code
     if 128 < code < 160:  # said here, since mpirun is told to be quiet
         why = " (out of memory?)" if code == 137 else ""
-        print(f"pneunet run: a rank was stopped by signal {code - 128}{why}", file=sys.stderr)
+        resume = "; the same command with --resume goes on from the last accepted step" if "solve" in command else ""
+        print(f"pneunet run: a rank was stopped by signal {code - 128}{why}{resume}", file=sys.stderr)
     return code

@@ -78,7 +78,7 @@ class BestBody:
 
     def ramp(self, tolerance):
         self.newton.options.relative_tolerance = tolerance
-        result = self.solve.run(MILESTONES[-1] * MPA, milestones=[load * MPA for load in MILESTONES])
+        result = self.solve.run(MILESTONES[-1] * MPA, milestones=[load * MPA for load in MILESTONES], stability=False)
         return [(step.load / MPA, step.iterations, step.factorisations) for step in result.steps]
 
     @property

@@ -139,7 +139,7 @@ DESIGNS = {
     "half a chamber": ("chambers = 2", "chambers = 2.5", "'chambers' must be a whole number, not 2.5"),
     "not a number": ("mu_MPa = 0.3", "mu_MPa = nan", "'mu_MPa' must be a finite number, not nan"),
     "modulus in kPa": ("mu_MPa = 0.3", "mu_MPa = 3e4", "is it in kPa?"),
-    "no pressure": ("pressure_kPa = 20", "pressure_kPa = 0", "pressure_kPa = 0 must lie in"),
+    "no pressure": ("pressure_kPa = 20", "pressure_kPa = 0", "pressure_kPa = 0 leaves nothing to solve"),
     "no material": ("[material]\nmu_MPa = 0.3", "", "key 'material' is missing"),
     "not TOML": ("chambers = 2", "chambers = two", "not valid TOML"),
 }

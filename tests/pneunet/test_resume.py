@@ -1,10 +1,13 @@
 """`pneunet solve --resume` after real kills, on one and two ranks, and what happens when nothing more can be written."""
 
+import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -75,6 +78,37 @@ def killed(tmp_path_factory, whole):
     return folder
 
 
+def ranks_of(launcher):
+    """Process ids of the ranks that a running `pneunet run` (a pid) has started: the children of its mpirun."""
+    parents = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            parents.setdefault(int(stat.read_text().rsplit(")", 1)[1].split()[1]), []).append(int(stat.parent.name))
+        except (OSError, ValueError):
+            continue  # ended just now
+    return sorted(rank for mpirun in parents.get(launcher, []) for rank in parents.get(mpirun, []))
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_rank_that_dies_ends_the_run_and_the_next_goes_on(whole, tmp_path, which):
+    shutil.copytree(whole / "mesh", tmp_path / "mesh")
+    command = [sys.executable, "-m", "pneunet", "run", "-n", "2", "--", sys.executable, "-m", "pneunet", *SOLVE, "-o", str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=DATA.parent.parent)
+    deadline = time.monotonic() + 120
+    while reached(tmp_path) < 2 and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    os.kill(ranks_of(process.pid)[which], signal.SIGKILL)
+    told = process.communicate(timeout=30)[1]  # no deadlock
+    assert process.returncode == 137
+    assert "a rank was stopped by signal 9" in told and "--resume goes on" in told and len(told.splitlines()) == 1
+    assert 2 <= reached(tmp_path) < reached(whole)
+    done = solve(tmp_path, "--resume", ranks=2)
+    assert done.returncode == 0, done.stderr
+    columns = TABLES["steps.csv"]
+    one, two = (read_columns(folder / "solve" / "steps.csv", columns) for folder in (whole, tmp_path))
+    assert two == pytest.approx(one, rel=1e-8, abs=1e-8)
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_killed_run_ends_at_the_same_result(whole, killed, tmp_path, ranks):
     folder = tmp_path / "run"
@@ -96,7 +130,8 @@ def test_a_killed_run_ends_at_the_same_result(whole, killed, tmp_path, ranks):
 def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(whole, folder)
-    assert "complete" in solve(folder, "--resume").stdout
+    told = solve(folder, "--resume").stdout
+    assert "complete" in told and "done" not in told
     for options, message in ((["--mesh-size-mm", "4"], "add --mesh-size-mm 3"), (["--pressure-kPa", "5"], "has passed")):
         refused = solve(folder, "--resume", *options)
         assert refused.returncode == 2 and message in refused.stderr and len(refused.stderr.splitlines()) == 1
