@@ -136,11 +136,23 @@ class ManipulatorSolve:
         self.system.destroy()
 
 
-def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, comm=MPI.COMM_WORLD, say=print, resume=False):
+def solve_design(
+    design,
+    directory,
+    mesh_size=None,
+    pressure=None,
+    fields=True,
+    comm=MPI.COMM_WORLD,
+    say=print,
+    resume=False,
+    milestones=(),
+    on_measured=lambda measured: None,
+):
     """Mesh (if not there yet) and solve a geometry.designfile.Design; files in directory/mesh and directory/solve.
 
     mesh_size in mm and pressure in MPa override the design's. `resume` goes on from directory/solve/checkpoint.npz, which
-    every accepted step leaves, on any number of ranks. Returns the last Measured. Raises InputError on bad
+    every accepted step leaves, on any number of ranks. milestones: pressures (MPa) that are hit exactly; on_measured(Measured) sees
+    every accepted state. Returns the last Measured. Raises InputError on bad
     input and ConvergenceError (with everything accepted on disk) when the pressure cannot be reached.
     """
     directory = Path(directory)
@@ -218,12 +230,13 @@ def solve_design(design, directory, mesh_size=None, pressure=None, fields=True, 
             checkpoint.save(out, solve.path, solve.last_step, body, mesh_size)
             if comm.rank == 0:
                 say(_progress(m, pressure, breaks_at))
+        on_measured(m)
 
     if not before:
         keep(solve.measure())
     status, failure, result = "reached the pressure asked for", None, None
     try:
-        result = solve.run(pressure, keep, before=before)
+        result = solve.run(pressure, keep, milestones, before=before)
     except KeyboardInterrupt:
         record("interrupted")
         say(f"interrupted at {last[0].pressure * KPA:.4g} kPa; the result up to there is in {out}")

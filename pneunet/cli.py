@@ -107,6 +107,11 @@ def parser():
     c.add_argument("cell", type=Path, metavar="CELL.toml")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the file's folder")
 
+    c = add("study", run_study, "cells, segments or manipulators over a grid or a list; on MPI ranks: pneunet run -n 3 study STUDY.toml")
+    c.add_argument("study", type=Path, metavar="STUDY.toml")
+    c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the study; finished cases there are kept")
+
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
 
@@ -173,6 +178,12 @@ def run_cell(a):
     from hifi.cell_run import run_cell as work
 
     work(a.cell, a.output or a.cell.parent, say=say)
+
+
+def run_study(a):
+    from hifi.study import run_study as work
+
+    work(a.study, a.output or Path("out") / a.study.stem, say=say, retry=a.retry)
 
 
 def run_report(a):
