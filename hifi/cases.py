@@ -144,6 +144,7 @@ def _run_in(folder, case, limits):
         answer = {**_how_it_failed(ended, limits, (folder / "log.txt").read_text(errors="replace")), "result": None}
     for name in ("case.json", "answer.json"):
         (folder / name).unlink(missing_ok=True)
+    answer["reason"] = answer["reason"].replace(str(folder.resolve()), str(folder.with_name(case.name)))
     return _record(case, answer, ended.seconds, ended.peak_memory_MB)
 
 

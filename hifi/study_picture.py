@@ -83,12 +83,12 @@ class _Looks:
         if self.numeric and len(self.values) > LEGEND_LIMIT:
             low, high = min(self.values), max(self.values)
             colours = LinearSegmentedColormap.from_list("values", [self._colour(v) for v in np.linspace(low, high, 64)])
-            figure.colorbar(ScalarMappable(Normalize(low, high), colours), ax=axes, label=_words(self.variable), fraction=0.02)
+            figure.colorbar(ScalarMappable(Normalize(low, high), colours), ax=axes, label="{} ({})".format(*_split(self.variable)), fraction=0.02)
         else:
-            handles += [Line2D([], [], color=self._colour(v), label=f"{_words(self.variable)} {_short(v)}") for v in self.values]
-        if self.others:
+            handles += [Line2D([], [], color=self._colour(v), label=_told(self.variable, v)) for v in self.values]
+        if len(self.combinations) > 1:
             for number, combination in enumerate(self.combinations[: len(STYLES) * len(MARKERS)]):
-                label = ", ".join(f"{_words(name)} {_short(value)}" for name, value in zip(self.others, combination))
+                label = ", ".join(_told(name, value) for name, value in zip(self.others, combination))
                 handles.append(Line2D([], [], color="0.3", label=label, **self._line(number)))
         if some_stopped:
             handles.append(Line2D([], [], color="black", marker="x", linestyle="", label="ended before its top pressure"))
@@ -101,12 +101,16 @@ def _in_order(values):
     return sorted(distinct) if all(isinstance(value, (int, float)) for value in distinct) else distinct
 
 
-def _words(name):
-    """'wall (mm)' for 'wall_mm'."""
+def _split(name):
+    """('wall', 'mm') of 'wall_mm'; the unit is empty where there is none."""
     quantity, _, unit = name.rpartition("_")
-    unit = unit.replace("per", "/")
-    return f"{quantity} ({unit})".replace("_", " ") if unit in ("mm", "deg", "MPa", "kPa", "percent") else name.replace("_", " ")
+    if unit not in ("mm", "deg", "MPa", "kPa", "percent"):
+        quantity, unit = name, ""
+    return quantity.replace("_", " "), unit
 
 
-def _short(value):
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def _told(name, value):
+    """'wall 1.2 mm', and a silicone by its name alone."""
+    quantity, unit = _split(name)
+    value = f"{value:g}" if isinstance(value, float) else str(value)
+    return value if name == "silicone" else f"{quantity} {value} {unit}".strip()

@@ -1,6 +1,6 @@
 """The command line: each link of the chain is a sub-command, and an importable function behind it.
 
-Exit codes: 0 done; 2 bad input or a load that could not be reached (one line on standard error, under MPI from one
+Exit codes: 0 done; 2 bad input, a load that could not be reached or too little memory (one line on standard error, under MPI from one
 rank); anything else is a bug and shows its traceback.
 """
 
@@ -219,7 +219,7 @@ def main(arguments=None):
     try:
         a = parser().parse_args(arguments)
         return a.function(a) or 0
-    except (InputError, ConvergenceError) as error:
+    except (InputError, ConvergenceError, MemoryError) as error:
         # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with it
         # what rank 0 still has to say, at the first failure
         if all(os.environ.get(name, "0") == "0" for name in MPI_RANK_VARIABLES):
