@@ -37,7 +37,7 @@ ANSWERS = (DONE, STOPPED, REFUSED)
 RECORD = "record.json"
 #: of the machine's memory, shared by the workers on it when no limit is given
 MEMORY_SHARE = 0.9
-LOCK_SECONDS = 10
+LOCK_SECONDS = 5
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from petsc4py import PETSc
 
-
 #: MUMPS could not allocate its workspace
 OUT_OF_MEMORY = -13
 

@@ -83,7 +83,9 @@ class _Looks:
         if self.numeric and len(self.values) > LEGEND_LIMIT:
             low, high = min(self.values), max(self.values)
             colours = LinearSegmentedColormap.from_list("values", [self._colour(v) for v in np.linspace(low, high, 64)])
-            figure.colorbar(ScalarMappable(Normalize(low, high), colours), ax=axes, label="{} ({})".format(*_split(self.variable)), fraction=0.02)
+            quantity, unit = _split(self.variable)
+            label = f"{quantity} ({unit})" if unit else quantity
+            figure.colorbar(ScalarMappable(Normalize(low, high), colours), ax=axes, label=label, fraction=0.02)
         else:
             handles += [Line2D([], [], color=self._colour(v), label=_told(self.variable, v)) for v in self.values]
         if len(self.combinations) > 1:

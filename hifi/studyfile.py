@@ -61,10 +61,10 @@ def read_study(path):
     A combination of the grid that is no valid body is kept with its refusal, a listed case or a whole grid of them is an error.
     """
     data, where = read_toml(path), str(path)
-    refuse_unknown(data, ["kind", "base", "levels", "limits", "grid", "case"], where)
-    for key in ("kind", "base"):
+    for key, fix in (("kind", "write 'cell', 'segment' or 'manipulator'"), ("base", 'write the body as [base], or base = "FILE.toml"')):
         if key not in data:
-            raise InputError(f"{where}: key '{key}' is missing" + (": write 'cell', 'segment' or 'manipulator'" if key == "kind" else ""))
+            raise InputError(f"{where}: key '{key}' is missing: {fix}")
+    refuse_unknown(data, ["kind", "base", "levels", "limits", "grid", "case"], where)
     kind = data["kind"]
     if kind not in KINDS:
         raise InputError(f"{where}: kind = {kind!r} is not known: write 'cell', 'segment' or 'manipulator'")
@@ -170,6 +170,8 @@ def _put(table, path, value):
         chosen, rest = ([table[range(1, len(table) + 1).index(int(path[0]))]], path[1:]) if path[0].isdigit() else (table, path)
         for each in chosen:
             _put(each, rest, value)
+    elif path[0].isdigit():
+        raise ValueError("a number enters a list only")
     elif len(path) == 1:
         if path[0] in NAMES_OF_MATERIALS:
             table.clear()
