@@ -120,7 +120,7 @@ def run_case(case, directory, limits, version="unknown"):
         os.chmod(folder, 0o755)
         os.rename(folder, directory / case.name)
     except OSError as error:  # nothing is on disk: the next run computes it again
-        reason = f"could not be written to {directory} ({error.strerror or error})"
+        reason = f"could not be started or recorded ({error})"
         record = _record(case, {"status": CRASHED, "reason": reason, "result": None}, time.time() - started, None)
     return case, record
 

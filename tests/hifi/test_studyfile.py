@@ -27,15 +27,15 @@ def cells(of):
     return [cell_from_tables(c.case.inputs, "") for c in of.cases]
 
 
-def test_a_grid_is_the_full_product_in_the_order_written(shared_directory):
-    found = study(shared_directory, kind="cell", base=CELL, levels=3, grid={"angle_deg": [60, 90], "pressure_kPa": [5, 10, 20]})
+def test_a_grid_is_the_full_product_in_the_order_written(tmp_path):
+    found = study(tmp_path, kind="cell", base=CELL, levels=3, grid={"angle_deg": [60, 90], "pressure_kPa": [5, 10, 20]})
     assert found.variables == ("angle_deg", "pressure_kPa")
     got = [(c.segment.angle, c.pressure, c.levels) for c in cells(found)]
     assert got == [(a, pytest.approx(p / 1e3), 3) for a in (60, 90) for p in (5, 10, 20)]
 
 
-def test_a_list_goes_through_the_grid_case_by_case(shared_directory):
-    found = study(shared_directory, kind="cell", base=CELL, case=[{"wall_mm": 1.2}, {"gap_mm": 1.5}], grid={"angle_deg": [60, 75]})
+def test_a_list_goes_through_the_grid_case_by_case(tmp_path):
+    found = study(tmp_path, kind="cell", base=CELL, case=[{"wall_mm": 1.2}, {"gap_mm": 1.5}], grid={"angle_deg": [60, 75]})
     assert [(c.segment.wall, c.segment.gap, c.segment.angle) for c in cells(found)] == [
         (1.2, 1.0, 60.0),
         (1.2, 1.0, 75.0),
@@ -46,42 +46,42 @@ def test_a_list_goes_through_the_grid_case_by_case(shared_directory):
     assert [value_of("wall_mm", c) for c in found.cases] == [1.2, 1.2, 1.0, 1.0]
 
 
-def test_a_named_silicone_replaces_the_material_and_keys_change_values_in_it(shared_directory):
+def test_a_named_silicone_replaces_the_material_and_keys_change_values_in_it(tmp_path):
     listed = [{"silicone": "Dragon Skin 30"}, {"mu_MPa": 0.2}, {"density_kg_per_m3": 900.0, "silicone": "Dragon Skin 30"}]
     listed += [{"material": {"law": "Yeoh", "c10_MPa": 0.1}}]
-    named, softer, lighter, yeoh = (c.segment.material for c in cells(study(shared_directory, kind="cell", base=CELL, case=listed)))
+    named, softer, lighter, yeoh = (c.segment.material for c in cells(study(tmp_path, kind="cell", base=CELL, case=listed)))
     assert named == silicone("Dragon Skin 30")
     assert (softer.mu, softer.density) == (0.2, pytest.approx(1e-9))
     assert (lighter.mu, lighter.density) == (named.mu, pytest.approx(0.9e-9))
     assert (yeoh.law, yeoh.c10) == ("Yeoh", 0.1)
 
 
-def test_segments_of_a_manipulator_are_varied_together_or_one_alone(shared_directory):
+def test_segments_of_a_manipulator_are_varied_together_or_one_alone(tmp_path):
     listed = [{"angle_deg": 75.0}, {"segment.2.angle_deg": 80.0}, {"segment.2.material.mu_MPa": 0.7}]
-    found = study(shared_directory, kind="manipulator", base=TWO, case=listed)
+    found = study(tmp_path, kind="manipulator", base=TWO, case=listed)
     bodies = [design_from_tables(c.case.inputs["design"], "").manipulator.segments for c in found.cases]
     assert [[s.angle for s in body] for body in bodies] == [[75, 75], [60, 80], [60, 60]]
     assert [[s.material.mu for s in body] for body in bodies] == [[0.3, 0.5], [0.3, 0.5], [0.3, 0.7]]
     assert [value_of("segment.2.angle_deg", c) for c in found.cases] == [75, 80, 60]
 
 
-def test_the_body_may_stand_in_a_file(shared_directory):
-    (shared_directory / "body.toml").write_text(toml_text(TWO))
-    found = study(shared_directory, kind="manipulator", base="body.toml", grid={"wall_mm": [1, 1.2]})
-    inline = study(shared_directory, kind="manipulator", base=TWO, grid={"wall_mm": [1, 1.2]})
+def test_the_body_may_stand_in_a_file(tmp_path):
+    (tmp_path / "body.toml").write_text(toml_text(TWO))
+    found = study(tmp_path, kind="manipulator", base="body.toml", grid={"wall_mm": [1, 1.2]})
+    inline = study(tmp_path, kind="manipulator", base=TWO, grid={"wall_mm": [1, 1.2]})
     assert [c.case for c in found.cases] == [c.case for c in inline.cases]
 
 
-def test_a_combination_that_is_no_body_keeps_its_reason(shared_directory):
-    found = study(shared_directory, kind="cell", base=CELL, grid={"side_wall_mm": [1, 7]})
+def test_a_combination_that_is_no_body_keeps_its_reason(tmp_path):
+    found = study(tmp_path, kind="cell", base=CELL, grid={"side_wall_mm": [1, 7]})
     good, bad = found.cases
     assert good.case and bad.case is None and "side_wall_mm = 7: two side walls do not fit" in bad.refusal
 
 
-def test_a_case_is_known_by_its_complete_inputs(shared_directory):
+def test_a_case_is_known_by_its_complete_inputs(tmp_path):
     """The same body under another spelling is the same case; another mesh is another one."""
-    spelt = study(shared_directory, kind="cell", base=CELL | {"mesh_size_mm": 1.5}, case=[{"segment.angle_deg": 75, "wall_mm": 1}])
-    grid = study(shared_directory, kind="cell", base=CELL, grid={"angle_deg": [75.0], "mesh_size_mm": [1.5, 2]})
+    spelt = study(tmp_path, kind="cell", base=CELL | {"mesh_size_mm": 1.5}, case=[{"segment.angle_deg": 75, "wall_mm": 1}])
+    grid = study(tmp_path, kind="cell", base=CELL, grid={"angle_deg": [75.0], "mesh_size_mm": [1.5, 2]})
     assert spelt.cases[0].case.name == grid.cases[0].case.name != grid.cases[1].case.name
 
 
