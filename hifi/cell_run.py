@@ -189,7 +189,8 @@ def run_cell(path, directory, say=print):
         write_csv(out / "cell.csv", HEADER, rows)
         say(
             f"{state.pressure * KPA:7.2f} kPa  e1 {e[0]:.4f}  k1 {k[0] * 1e3:.2f} rad/m  k2 {k[1] * 1e3:.2f} 1/m  k3 {k[2] * 1e3:.2f} 1/m  "
-            f"volume {state.volume:.1f} mm3  {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}"
+            f"volume {state.volume:.1f} mm3  "
+            f"stretch {state.largest_stretch:.2f}  {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}"
         )
 
     status, facts = "reached what was asked for", {}

@@ -153,7 +153,7 @@ def _inputs(kind, base, levels, values, where):
         except (AttributeError, TypeError, ValueError):
             raise InputError(f"{where}: '{name}' leads nowhere in the body; segments are counted from 1, segment.1.angle_deg") from None
     if kind == "cell":
-        return "hifi.study_cases:solve_cell_case", cell_tables(cell_from_tables({"levels": levels, **tables}, where))
+        return "hifi.study_cases:solve_cell_case", cell_tables(cell_from_tables({**tables, "levels": levels}, where))
     design = design_from_tables(tables, where)
     return "hifi.study_cases:solve_design_case", {"design": design_tables(design), "levels": levels}
 
