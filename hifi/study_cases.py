@@ -50,8 +50,8 @@ def solve_design_case(inputs, directory):
 
     def keep(m):
         factorisations.append(m.factorisations)
-        if m.pressure not in marks:
-            return
+        for between in [p for p in rows if p not in marks]:
+            del rows[between]  # only the last state may stand between two levels: where a path ended
         strains = {}
         for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
             prefix = f"segment{i}_" if len(m.strains.e) > 1 else ""
