@@ -41,7 +41,11 @@ class Design:
 
 def read_design(path):
     """The Design in a TOML file; InputError with file, table and key otherwise."""
-    data = read_toml(path)
+    return design_from_tables(read_toml(path), str(path))
+
+
+def design_from_tables(data, path):
+    """The Design in the tables of a design.toml; `path` is what errors call them."""
     refuse_unknown(data, KEYS, str(path))
     if data.get("schema", SCHEMA) != SCHEMA:
         raise InputError(f"{path}: schema = '{data['schema']}' is not '{SCHEMA}'")
@@ -63,15 +67,7 @@ def read_design(path):
         raise InputError(f"{path}: segments are written [[segment]], with double brackets")
     segments = []
     for i, row in enumerate(data["segment"], start=1):
-        where = f"{path} [[segment]] {i}"
-        row = as_table(row, where)
-        own = row.pop("material", None)
-        segment_material = material_from_table(own, f"{where} material") if own is not None else material
-        own = row.pop("layer_material", None)
-        segment_layer = material_from_table(own, f"{where} layer_material") if own is not None else None
-        if segment_layer is None and row.get("layer_thickness_mm"):
-            segment_layer = layer_material
-        segments.append(from_table(Segment, row, where, material=segment_material, layer_material=segment_layer))
+        segments.append(segment_from_table(row, f"{path} [[segment]] {i}", material, layer_material))
     try:
         manipulator = Manipulator(tuple(segments))
     except InputError as error:
@@ -88,6 +84,20 @@ def read_design(path):
         control=read_control(data, str(path)),
         measure=read_extras(data.get("measure", {}), f"{path} [measure]"),
     )
+
+
+def segment_from_table(row, where, material, layer_material=None):
+    """The Segment in a TOML table, its materials the ones given unless it has its own."""
+    row = as_table(row, where)
+    own = row.pop("material", None)
+    if own is not None:
+        material = material_from_table(own, f"{where} material")
+    own = row.pop("layer_material", None)
+    if own is not None:
+        layer_material = material_from_table(own, f"{where} layer_material")
+    elif not row.get("layer_thickness_mm"):
+        layer_material = None
+    return from_table(Segment, row, where, material=material, layer_material=layer_material)
 
 
 def _base_pose(table, where):

@@ -22,6 +22,7 @@ from geometry import cad
 from geometry.cell import AIR
 from hifi import compat, surface
 from hifi.materials import energy_density
+from hifi.stretch import PrincipalStretch
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
 DEGREE = 4
@@ -55,6 +56,7 @@ class CellProblem:
         self._define_forms()
         self._reduce()
         self._define_gauge(gauge, centre)
+        self.stretch = PrincipalStretch(self, self.cell_tags.indices[np.isin(self.cell_tags.values, (cad.BODY, cad.LAYER))])
 
     def _define_forms(self):
         mesh, material = self.mesh, self.segment.material
@@ -67,6 +69,7 @@ class CellProblem:
         y = ufl.as_vector((0, X[1], X[2])) + u
         stretch = ufl.as_vector([q[i] for i in range(3)]) + ufl.cross(ufl.as_vector([q[i] for i in range(3, 6)]), y)
         F = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]]) + ufl.outer(stretch, ufl.unit_vector(0, 3))
+        self.deformation_gradient = F
         J = ufl.det(F)
         energies = (
             (energy_density(mesh, material, F, p), solid),

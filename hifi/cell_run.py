@@ -1,7 +1,7 @@
 """`pneunet cell`: one pitch of a segment from rest to a pressure, free or at prescribed strains, with its rod stiffness."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +10,9 @@ from base.errors import ConvergenceError, InputError
 from base.files import output_directory, write_csv
 from base.materials import material_from_table, material_to_table
 from base.record import write_record
-from base.tables import as_table, from_table, number, read_toml, refuse_unknown, to_table
+from base.tables import as_table, number, read_toml, refuse_unknown, to_table
 from geometry.cell import mesh_cell
+from geometry.designfile import segment_from_table
 from geometry.parameters import Segment
 from hifi.cell import CellProblem
 from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
@@ -23,6 +24,10 @@ from hifi.stepping import StepSize, run_steps
 
 STRAINS = ("e1", "e2", "e3", "k1_per_mm", "k2_per_mm", "k3_per_mm")
 CONTROLS = ("pressure", "volume")
+KEYS = (
+    *("pressure_kPa", "mesh_size_mm", "levels", "control", "volume_factor"),
+    *("material", "layer_material", "segment", "held"),
+)
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,12 @@ class CellCase:
 
 def read_cell(path):
     """The CellCase in a TOML file; InputError with file, table and key otherwise."""
-    data, where = read_toml(path), str(path)
-    refuse_unknown(data, ["pressure_kPa", "mesh_size_mm", "levels", "control", "volume_factor", "material", "segment", "held"], where)
+    return cell_from_tables(read_toml(path), str(path))
+
+
+def cell_from_tables(data, where):
+    """The CellCase in the tables of a CELL.toml; `where` is what errors call them."""
+    refuse_unknown(data, KEYS, where)
     for key in ("material", "segment"):
         if key not in data:
             raise InputError(f"{where}: key '{key}' is missing")
@@ -72,9 +81,29 @@ def read_cell(path):
         raise InputError(f"{where}: [held] strains go with control = 'pressure'")
     row = as_table(data["segment"], f"{where} [segment]")
     row.setdefault("chambers", 1)
-    material = material_from_table(data["material"], f"{where} [material]")
-    segment = from_table(Segment, row, f"{where} [segment]", material=material)
+    material, layer_material = (
+        material_from_table(data[key], f"{where} [{key}]") if key in data else None for key in ("material", "layer_material")
+    )
+    segment = segment_from_table(row, f"{where} [segment]", material, layer_material)
     return CellCase(segment, pressure, float(mesh_size), levels, held, control, float(volume_factor))
+
+
+def cell_tables(case):
+    """The complete tables of a CellCase, which cell_from_tables reads back."""
+    segment = case.segment
+    tables = {
+        "pressure_kPa": float(f"{case.pressure * KPA:.12g}"),
+        "mesh_size_mm": case.mesh_size,
+        "levels": case.levels,
+        "control": case.control,
+        "volume_factor": case.volume_factor,
+        "material": material_to_table(segment.material),
+        "segment": to_table(segment),
+        "held": {STRAINS[i]: value for i, value in case.held.items()},
+    }
+    if segment.layer_material is not None:
+        tables["layer_material"] = material_to_table(segment.layer_material)
+    return tables
 
 
 def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lambda point: None):
@@ -87,9 +116,19 @@ def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lamb
     problem = CellProblem(case.segment, mesh_path)
     mu, options = case.segment.material.mu, NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
     system = CellSystem(problem)
-    try:
-        last = [system.measure()]
+    last, effort, started = [], {"steps": 0, "factorisations": 0, "seconds": 0.0}, time.perf_counter()
+
+    def count(step):
+        effort["steps"] += 1
+        effort["factorisations"] += step.factorisations
+        effort["seconds"] = time.perf_counter() - started
+
+    def record():
+        last[:] = [replace(system.measure(), **effort)]
         on_state(last[0])
+
+    try:
+        record()
         rest = system.volume()
         if case.control == "volume":
             start, target = rest, rest * case.volume_factor
@@ -103,25 +142,24 @@ def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lamb
         passed = 0
 
         def keep(step):
+            count(step)
             nonlocal passed
             for point in path.limit_points[passed:]:
                 on_limit_point(point)
             passed = len(path.limit_points)
             if step.load in marks:
-                last[:] = [system.measure()]
-                on_state(last[0])
+                record()
 
         run_steps(path, target, StepSize(first, 1e-4 * first, milestones=marks), keep)
         if case.held:
-            system = _hold(problem, system, case, options)
-            last[:] = [system.measure()]
-            on_state(last[0])
+            system = _hold(problem, system, case, options, count)
+            record()
         return last[0], facts
     finally:
         system.destroy()
 
 
-def _hold(problem, free, case, options):
+def _hold(problem, free, case, options, on_step):
     """A system with prescribed strains at the top pressure, walked there from the free state."""
     held = np.isin(np.arange(6), list(case.held))
     start = free.state[-6:].copy()
@@ -131,7 +169,7 @@ def _hold(problem, free, case, options):
     system = CellSystem(problem, held, (case.pressure, 0.0), (start, change))
     system.state = free.state.copy()
     try:
-        run_steps(EquilibriumPath(system, LoadControl(), options), 1.0, StepSize(0.25, 1e-3))
+        run_steps(EquilibriumPath(system, LoadControl(), options), 1.0, StepSize(0.25, 1e-3), on_step)
     except BaseException:
         system.destroy()
         raise
@@ -141,7 +179,7 @@ def _hold(problem, free, case, options):
 
 HEADER = [
     *"pressure_kPa volume_mm3 e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm k_norm_per_mm k_dot_e_per_mm".split(),
-    *"force1_N force2_N force3_N moment1_N_mm moment2_N_mm moment3_N_mm unstable_directions".split(),
+    *"force1_N force2_N force3_N moment1_N_mm moment2_N_mm moment3_N_mm unstable_directions largest_stretch".split(),
     *(f"K{i}{j}" for i in range(1, 7) for j in range(1, 7)),
     *(f"kirchhoff{i}{j}" for i in range(1, 5) for j in range(1, 5)),
 ]
@@ -161,12 +199,13 @@ def run_cell(path, directory, say=print):
         e, k = state.strains.e, state.strains.k
         rows.append(
             [state.pressure * KPA, state.volume, *e, *k, np.linalg.norm(k), k @ e, *state.force, *state.moment, state.unstable]
-            + [*state.stiffness.ravel(), *state.kirchhoff_stiffness.ravel()]
+            + [state.largest_stretch, *state.stiffness.ravel(), *state.kirchhoff_stiffness.ravel()]
         )
         write_csv(out / "cell.csv", HEADER, rows)
         say(
             f"{state.pressure * KPA:7.2f} kPa  e1 {e[0]:.4f}  k1 {k[0] * 1e3:.2f} rad/m  k2 {k[1] * 1e3:.2f} 1/m  k3 {k[2] * 1e3:.2f} 1/m  "
-            f"volume {state.volume:.1f} mm3  {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}"
+            f"volume {state.volume:.1f} mm3  "
+            f"stretch {state.largest_stretch:.2f}  {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}"
         )
 
     status, facts = "reached what was asked for", {}

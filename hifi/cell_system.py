@@ -18,7 +18,8 @@ class CellState:
     """One equilibrium, per undeformed length: strains (e, k); force (N) and moment (N mm) in the section frame.
 
     stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure in MPa;
-    unstable: directions in which the cell is unstable at this pressure (its free strains included).
+    unstable: directions in which the cell is unstable at this pressure (its free strains included); steps, factorisations in
+    them and seconds: what it took to come here from rest (hifi.cell_run).
     """
 
     pressure: float
@@ -28,6 +29,10 @@ class CellState:
     stiffness: np.ndarray
     volume: float
     unstable: int
+    largest_stretch: float
+    steps: int = 0
+    factorisations: int = 0
+    seconds: float = 0.0
 
     @property
     def kirchhoff_stiffness(self):
@@ -177,6 +182,7 @@ class CellSystem:
             self._condensed / self.pitch,
             self.problem.air_volume(),
             self.unstable,
+            self.problem.stretch.largest(),
         )
 
     def destroy(self):

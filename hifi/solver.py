@@ -2,6 +2,9 @@
 
 from petsc4py import PETSc
 
+#: MUMPS could not allocate its workspace
+OUT_OF_MEMORY = -13
+
 
 class NotConverged(RuntimeError):
     """This solve failed; the stepper decides what to try next."""
@@ -37,8 +40,11 @@ class DirectSolver:
         self.ksp.setOperators(self.matrix)
         self.ksp.setUp()
         self.factorisations += 1
-        if self.ksp.getPC().getFactorMatrix().getMumpsInfog(1) < 0:
-            raise NotConverged("the tangent could not be factorised (out of memory or singular)")
+        code = self.ksp.getPC().getFactorMatrix().getMumpsInfog(1)
+        if code == OUT_OF_MEMORY:  # a smaller step would not help
+            raise MemoryError("the tangent could not be factorised for want of memory: take a coarser mesh")
+        if code < 0:
+            raise NotConverged(f"the tangent could not be factorised (MUMPS error {code})")
 
     @property
     def negative_pivots(self):

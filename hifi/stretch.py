@@ -12,14 +12,14 @@ POINTS = np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]])
 
 
 class PrincipalStretch:
-    """Largest principal stretch at the 4 interior points of every cell."""
+    """Largest principal stretch at the 4 interior points of every cell, or of these local `cells`."""
 
-    def __init__(self, problem):
+    def __init__(self, problem, cells=None):
         self.problem, mesh = problem, problem.mesh
         self._gradient = compat.expression(mesh, problem.deformation_gradient, POINTS)
-        self._cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
+        self._cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32) if cells is None else cells
         space = problem.displacement_space
-        self._nodes = compat.cell_dofs(space)[: len(self._cells)]
+        self._nodes = compat.cell_dofs(space)[self._cells]
         self._sum = fem.Function(space)
         self._count = self._add_up(np.ones(len(self._cells))).copy()
 

@@ -1,6 +1,6 @@
 """The command line: each link of the chain is a sub-command, and an importable function behind it.
 
-Exit codes: 0 done; 2 bad input or a load that could not be reached (one line on standard error, under MPI from one
+Exit codes: 0 done; 2 bad input, a load that could not be reached or too little memory (one line on standard error, under MPI from one
 rank); anything else is a bug and shows its traceback.
 """
 
@@ -109,6 +109,11 @@ def parser():
     c.add_argument("cell", type=Path, metavar="CELL.toml")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the file's folder")
 
+    c = add("study", run_study, "cells, segments or manipulators over a grid or a list; on MPI ranks: pneunet run -n 3 study STUDY.toml")
+    c.add_argument("study", type=Path, metavar="STUDY.toml")
+    c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the study; finished cases there are kept")
+
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
 
@@ -175,6 +180,12 @@ def run_cell(a):
     work(a.cell, a.output or a.cell.parent, say=say)
 
 
+def run_study(a):
+    from hifi.study import run_study as work
+
+    work(a.study, a.output or Path("out") / a.study.stem, say=say, retry=a.retry)
+
+
 def run_report(a):
     from design.report import write_report
 
@@ -208,7 +219,7 @@ def main(arguments=None):
     try:
         a = parser().parse_args(arguments)
         return a.function(a) or 0
-    except (InputError, ConvergenceError) as error:
+    except (InputError, ConvergenceError, MemoryError) as error:
         # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with it
         # what rank 0 still has to say, at the first failure
         if all(os.environ.get(name, "0") == "0" for name in MPI_RANK_VARIABLES):

@@ -4,13 +4,14 @@ Open MPI refuses to run as root and to run more ranks than it counts cores, and 
 read different variables to be told otherwise. Here they are all told, whichever is installed.
 """
 
-import ctypes
 import os
 import shutil
 import signal
 import subprocess
 import sys
 from pathlib import Path
+
+from base.processes import end_with_parent, environment_without_launcher
 
 # Variables of Open MPI 4 (OMPI_...) and 5 (PRTE_... for its launcher). A value the user has set wins.
 SETTINGS = {
@@ -40,10 +41,8 @@ SETTINGS = {
 
 def environment() -> dict[str, str]:
     """The environment for mpirun: ours, the settings above, this Python's programs first on PATH."""
-    env = dict(os.environ)
-    if "PMIX_RANK" in env:  # started by an mpirun ourselves: its marks would confuse the new one
-        env = {k: v for k, v in env.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
-    env = SETTINGS | env
+    # started by an mpirun ourselves, its marks would confuse the new one
+    env = SETTINGS | (environment_without_launcher() if "PMIX_RANK" in os.environ else dict(os.environ))
     env["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), env.get("PATH", os.defpath)])
     return env
 
@@ -58,12 +57,6 @@ def command_line(ranks: int, command: list[str]) -> list[str]:
     return ["mpirun", "-n", str(ranks), *program]
 
 
-def _die_with_parent():
-    """Killed ourselves, even by SIGKILL, we leave no ranks behind that would write into the next run's results."""
-    PR_SET_PDEATHSIG = 1
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
 def run(ranks: int, command: list[str]) -> int:
     """Run `command` on `ranks` ranks, with our standard streams; returns its exit code."""
     try:
@@ -76,7 +69,8 @@ def run(ranks: int, command: list[str]) -> int:
         if shutil.which(needed, path=env["PATH"]) is None:
             print(f"pneunet run: {needed} not found (make setup; pneunet doctor tells more)", file=sys.stderr)
             return 127
-    with subprocess.Popen(line, env=env, preexec_fn=_die_with_parent) as process:
+    # killed ourselves, even by SIGKILL, we leave no ranks behind that would write into the next run's results
+    with subprocess.Popen(line, env=env, preexec_fn=end_with_parent) as process:
         # Told to end, we tell mpirun, so that no rank is left behind.
         previous = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
         try:

@@ -250,6 +250,49 @@ def test_shapes_beyond_the_reduced_models_limit_keep_the_others(folder, capsys, 
     assert (folder / "out" / "shape" / "centrelines.csv").is_file()
 
 
+STUDY = """kind = "cell"
+levels = 1
+[base]
+pressure_kPa = 10
+mesh_size_mm = 3
+[base.material]
+mu_MPa = 0.3
+[base.segment]
+kind = "one-sided"
+angle_deg = 60
+[grid]
+wall_mm = [1, 1.2]
+"""
+STUDIES = {
+    "no kind": ('kind = "cell"\n', "", "key 'kind' is missing: write 'cell', 'segment' or 'manipulator'"),
+    "kind": ('kind = "cell"', 'kind = "cells"', "kind = 'cells' is not known: write 'cell', 'segment' or 'manipulator'"),
+    "no base": ("[base", "[bass", "key 'base' is missing: write the body as [base], or base = \"FILE.toml\""),
+    "unknown key": ("[grid]", "[gird]", "unknown key 'gird': did you mean 'grid'?"),
+    "body without a key": ("pressure_kPa = 10\n", "", "key 'pressure_kPa' is missing"),
+    "body's unknown key": ("pressure_kPa = 10", "pressure_kPa = 10\nmesh_mm = 3", "'mesh_mm'"),
+    "nothing varied": ("[grid]\nwall_mm = [1, 1.2]", "", "nothing is varied: write [grid] with key = [values], or [[case]] tables"),
+    "unknown variable": ("wall_mm", "wal_mm", "[grid]: unknown key 'wal_mm': did you mean 'wall_mm'?"),
+    "variable's unit": ("wall_mm", "wall_m", "[grid]: key 'wall_m' has the wrong unit: write 'wall_mm'"),
+    "one value": ("[1, 1.2]", "1.2", "wall_mm = 1.2 must be a list of values: write wall_mm = [1.2, ...]"),
+    "no value": ("[1, 1.2]", "[]", "wall_mm = [] must be a list of values"),
+    "path": ("wall_mm", "segment.2.wall_mm", "'segment.2.wall_mm' leads nowhere in the body"),
+    "unknown silicone": ("wall_mm = [1, 1.2]", 'silicone = ["Ecoflex"]', "silicone = 'Ecoflex' is not in the table"),
+    "listed case that is no body": ("[grid]\nwall_mm = [1, 1.2]", "[[case]]\nwall_mm = 1\n[[case]]\nwall_mm = -1", "wall_mm = -1 must be"),
+    "listed twice": ("[grid]", "[[case]]\nwall_mm = 1\n[grid]", "'wall_mm' is in the list of cases too"),
+    "no valid body": ("[1, 1.2]", "[-1, 0]", "wall_mm = -1 must be larger than 0"),
+    "levels": ("levels = 1", "levels = 0", "levels = 0 must lie in 1..1000"),
+    "limit": ("[grid]", "[limits]\nmemory_GB = 2\n[grid]", "[limits]: key 'memory_GB' has the wrong unit: write 'memory_MB'"),
+    "limit's value": ("[grid]", "[limits]\ntime_s = 0\n[grid]", "time_s = 0 must be larger than 0"),
+    "two segments": ("[base.segment]", "[[base.segment]]", "a cell has one segment"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "message"), STUDIES.values(), ids=STUDIES)
+def test_study(folder, capsys, old, new, message):
+    (folder / "study.toml").write_text(STUDY.replace(old, new))
+    assert message in refused(capsys, folder, "study", "study.toml")
+
+
 CELL = """pressure_kPa = 10
 mesh_size_mm = 3
 levels = 2

@@ -1,0 +1,96 @@
+"""What a study computes: the functions that hifi.cases runs in a process of their own, one for each kind of body.
+
+Both leave levels.csv in the case's folder, a row for each pressure level as it is reached, so that a case that is ended half
+way keeps what it had; and the cell.toml or design.toml with which the single case is run by hand.
+"""
+
+import json
+
+import numpy as np
+
+from base.files import write_csv, write_text
+from base.tables import toml_text
+from geometry.designfile import design_from_tables, write_design
+from geometry.parameters import Manipulator
+from hifi.cell_run import KPA, cell_from_tables, solve_cell
+from hifi.manipulator_run import break_stretch, solve_design
+from hifi.study import LEVELS
+
+STRAINS = "e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm k_norm_per_mm k_dot_e_per_mm".split()
+EFFORT = ["steps", "factorisations", "seconds"]
+
+
+def solve_cell_case(inputs, directory):
+    """One cell: `inputs` are the tables of a CELL.toml. Returns the facts of its mesh."""
+    case = cell_from_tables(inputs, "the case")
+    write_text(directory / "cell.toml", toml_text(inputs))
+    breaks_at, rows = break_stretch(Manipulator((case.segment,))), []
+
+    def keep(state):
+        rows.append(
+            {
+                "pressure_kPa": state.pressure * KPA,
+                **_strains(state.strains.e, state.strains.k),
+                **_body(state, breaks_at),
+                **{name: getattr(state, name) for name in EFFORT},
+            }
+        )
+        _write(directory, rows)
+
+    return {"mesh": solve_cell(case, directory / "cell.msh", keep)[1]}
+
+
+def solve_design_case(inputs, directory):
+    """One manipulator: `inputs` are {"design": the tables of a design.toml, "levels": number of equal pressure steps}."""
+    design = design_from_tables(inputs["design"], "the case")
+    write_design(directory / "design.toml", design)
+    marks = np.linspace(0.0, design.pressure, inputs["levels"] + 1)
+    breaks_at, rows = break_stretch(design.manipulator), {}
+    factorisations = []
+
+    def keep(m):
+        factorisations.append(m.factorisations)
+        for between in [p for p in rows if p not in marks]:
+            del rows[between]  # only the last state may stand between two levels: where a path ended
+        strains = {}
+        for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
+            prefix = f"segment{i}_" if len(m.strains.e) > 1 else ""
+            strains |= {prefix + name: value for name, value in _strains(e, k).items()}
+        nearest = float(m.walls.min()) if len(m.walls) else np.inf
+        # by pressure: under further loads the last state there counts
+        rows[m.pressure] = {
+            "pressure_kPa": m.pressure * KPA,
+            **strains,
+            **{f"tip_{axis}_mm": value for axis, value in zip("xyz", m.frames[-1, :3, 3])},
+            "smallest_wall_distance_mm": nearest if np.isfinite(nearest) else "",
+            **_body(m, breaks_at, nearest),
+            **{"steps": m.step, "factorisations": sum(factorisations), "seconds": m.seconds},
+        }
+        _write(directory, rows.values())
+
+    solve_design(design, directory, fields=False, milestones=tuple(marks[1:]), on_measured=keep)
+    return {"mesh": json.loads((directory / "mesh" / "mesh.json").read_text())}
+
+
+def _strains(e, k):
+    return dict(zip(STRAINS, [*e, *k, np.linalg.norm(k), k @ e]))
+
+
+def _body(state, breaks_at, nearest=np.inf):
+    """What cells and manipulators tell alike, and a word on what makes the row doubtful."""
+    warnings = {
+        "walls overlap": nearest < 0,
+        "stretched beyond break": state.largest_stretch > breaks_at,
+        "unstable": state.unstable,
+    }
+    return {
+        "volume_mm3": state.volume,
+        "largest_stretch": state.largest_stretch,
+        "unstable_directions": state.unstable,
+        "warnings": ", ".join(word for word, holds in warnings.items() if holds),
+    }
+
+
+def _write(directory, rows):
+    rows = list(rows)
+    write_csv(directory / LEVELS, list(rows[0]), [row.values() for row in rows])
