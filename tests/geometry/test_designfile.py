@@ -8,6 +8,7 @@ from base.errors import InputError
 from base.materials import Gent, NeoHookean
 from geometry import Manipulator, Segment
 from geometry.designfile import Design, read_design, write_design
+from geometry.loading import Control, DeadLoads, Extras
 
 MATERIAL = NeoHookean(mu=0.25, name='soft "A"', source="a \\ b")
 DESIGN = Design(
@@ -24,6 +25,9 @@ DESIGN = Design(
     base_pose=se3.make_pose(se3.exp_rotation([0.3, -0.2, 1.0]), [1.0, 2.0, 3.0]),
     mesh_size=1.5,
     target="a b.csv",
+    loads=DeadLoads(gravity=(0.0, 0.0, -9810.0), tip_moment=(0.0, 1.5, 0.0)),
+    control=Control("volume", volume_factor=4.0),
+    measure=Extras(tip_stiffness=True),
     result={"errors": {"rms_mm": 0.5}, "piece": [{"kind": "twisting"}, {"kind": "bending"}]},
 )
 MINIMAL = """pressure_kPa = 20
@@ -42,11 +46,18 @@ def test_a_design_reads_back_as_it_was(tmp_path):
     back = read_design(path)
     assert back.manipulator == DESIGN.manipulator
     assert back.base_pose == pytest.approx(DESIGN.base_pose, abs=1e-15)
-    for name in ("pressure", "name", "mesh_size", "target", "result"):
+    for name in ("pressure", "name", "mesh_size", "target", "result", "loads", "control", "measure"):
         assert getattr(back, name) == getattr(DESIGN, name), name
     first = path.read_text()
     write_design(path, back)
     assert path.read_text() == first
+
+
+def test_loads_turn_with_the_base():
+    """Weight down the target's z, on a body whose axis hangs down, pulls along the axis."""
+    hanging = se3.make_pose(np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]), np.zeros(3))
+    loads = DeadLoads(gravity=(0.0, 0.0, -9810.0)).in_body(hanging)
+    assert loads.gravity == pytest.approx((9810.0, 0.0, 0.0)) and loads.tip_force == (0.0, 0.0, 0.0)
 
 
 def test_a_short_file_has_the_defaults(tmp_path):

@@ -119,12 +119,15 @@ def test_prescribed_curvature_leaves_the_other_strains_free(one_sided, tmp_path)
 def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
     """The case `ballooning`, without a contact model: pressure rises to a limit near 47 kPa and falls beyond it."""
     segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.208))
-    states = []
-    solve_cell(CellCase(segment, 0.05, 4.0, 8, control="volume", volume_factor=8.0), tmp_path / "cell.msh", states.append)
+    states, limits = [], []
+    case = CellCase(segment, 0.05, 4.0, 8, control="volume", volume_factor=8.0)
+    solve_cell(case, tmp_path / "cell.msh", states.append, limits.append)
     pressure, unstable = (np.array([getattr(s, name) for s in states]) for name in ("pressure", "unstable"))
     top = int(pressure.argmax())
     assert 0 < top < len(states) - 1
     assert 0.042 < pressure[top] < 0.052
+    [limit] = limits
+    assert limit.load == pytest.approx(pressure[top], rel=5e-3) and states[top - 1].volume < limit.volume < states[top + 1].volume
     assert (np.diff(pressure[: top + 1]) > 0).all() and (np.diff(pressure[top:]) < 0).all()
     # stable at fixed pressure before the limit, one unstable direction beyond it (further on, at 9 volumes, a branch leaves
     # this path, which has a second one from there)
