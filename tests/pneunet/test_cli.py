@@ -33,7 +33,7 @@ length_mm = 25.0
 COMMANDS = ("design", "shape", "mesh", "solve", "report", "fit-material", "run", "doctor")
 STEPS = [
     "step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
-    "smallest_wall_distance_mm", "largest_stretch", "unstable_directions", "seconds",
+    "smallest_wall_distance_mm", "largest_stretch", "unstable_directions", "dead_load_fraction", "stability_factorisations", "seconds",
 ]  # fmt: skip
 CENTRELINES = ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"]
 SEGMENTS = ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"]
