@@ -35,6 +35,17 @@ class CellState:
     seconds: float = 0.0
 
     @property
+    def screw_compliance(self):
+        """(2, 2) of 1/N and 1/(N mm2): how k.k/2 and k.e of a free state change under the wrench m = a k + b e, n = b k.
+
+        This wrench is in equilibrium along a screw by itself, so that the gauge carries nothing, and k.k and k.e are the same
+        for every line and every gauge: so is this part of the compliance. The rest of `stiffness` belongs to the section frame.
+        """
+        e, k = self.strains.e, self.strains.k
+        wrenches = np.array([np.concatenate([0 * k, k]), np.concatenate([k, e])])
+        return wrenches @ np.linalg.solve(self.stiffness, wrenches.T)
+
+    @property
     def kirchhoff_stiffness(self):
         """(4, 4) stiffness in (e1, k1, k2, k3) when the shears e2 and e3 relax."""
         kept, relaxed = [0, 3, 4, 5], [1, 2]

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from base.files import read_columns
 from base.materials import NeoHookean
+from geometry import cad
 from geometry.cell import mesh_cell
 from hifi.cell import CellProblem
 from hifi.cell_run import CellCase, run_cell, solve_cell
@@ -18,13 +19,14 @@ from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath
 from hifi.stepping import StepSize, run_steps
 from tests.cases import CASES
+from tests.recut import recut
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 
 
-def solved(segment, path, pressure, cut=0.0, mesh_size=2.5):
+def solved(segment, path, pressure, mesh_size=2.5):
     """The cell at `pressure` (MPa), its strains free."""
-    mesh_cell(segment, mesh_size, path, cut)
+    mesh_cell(segment, mesh_size, path)
     system = CellSystem(CellProblem(segment, path))
     follow(system, pressure, StepSize(first=0.005, smallest=1e-4))
     return system
@@ -89,18 +91,40 @@ def test_a_stiff_bottom_layer_keeps_its_length(one_sided, tmp_path):
     assert stretches[1] == pytest.approx(1.0, abs=2e-3)
 
 
-def test_twisting_cell_only_twists_and_the_cut_s_place_does_not_matter(tmp_path):
+def test_twisting_cell_only_twists(tmp_path):
     segment = CASES["twist_w12"](angle=60.0, chambers=1, material=NeoHookean(0.317))
-    twists = []
-    for cut in (0.0, 1.3):
-        cell = solved(segment, tmp_path / f"{cut}.msh", 0.02, cut)
-        state = cell.measure()
-        k = state.strains.k
-        assert np.abs(k[1:]).max() < 0.01 * abs(k[0])
-        twists.append(k[0])
-        cell.destroy()
-    # two different meshes of the same body
-    assert twists[1] == pytest.approx(twists[0], rel=0.03)
+    cell = solved(segment, tmp_path / "cell.msh", 0.02)
+    k = cell.measure().strains.k
+    assert np.abs(k[1:]).max() < 0.01 * abs(k[0])
+    cell.destroy()
+
+
+def at_gauge(segment, path, **gauge):
+    system = CellSystem(CellProblem(segment, path, **gauge))
+    follow(system, 0.02, StepSize(first=0.005, smallest=1e-4))
+    state = system.measure()
+    system.destroy()
+    return state
+
+
+def test_the_place_of_the_cut_does_not_matter(one_sided, tmp_path):
+    path, other = tmp_path / "cell.msh", tmp_path / "recut.msh"
+    mesh_cell(one_sided, 3.0, path)
+    recut(path, other, one_sided.pitch, 0.9)
+    state, moved = at_gauge(one_sided, path), at_gauge(one_sided, other)
+    for name in ("e", "k"):
+        assert getattr(moved.strains, name) == pytest.approx(getattr(state.strains, name), abs=1e-9)
+    assert moved.stiffness == pytest.approx(state.stiffness, abs=1e-8 * abs(state.stiffness).max())
+
+
+def test_what_no_section_frame_can_change(one_sided, tmp_path):
+    """Another gauge is another frame, whose strains and stiffness differ; |k|, k.e and the screw's compliance are the body's own."""
+    mesh_cell(one_sided, 3.0, tmp_path / "cell.msh")
+    state, other = (at_gauge(one_sided, tmp_path / "cell.msh", gauge=g) for g in ((cad.CHANNEL,), (cad.CAVITY,)))
+    assert abs(other.strains.e[1] - state.strains.e[1]) > 0.01
+    assert np.linalg.norm(other.strains.k) == pytest.approx(np.linalg.norm(state.strains.k), rel=1e-7)
+    assert other.strains.k @ other.strains.e == pytest.approx(state.strains.k @ state.strains.e, rel=1e-7)
+    assert other.screw_compliance == pytest.approx(state.screw_compliance, rel=1e-6)
 
 
 def test_prescribed_curvature_leaves_the_other_strains_free(one_sided, tmp_path):
