@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, speed, verification
+from benchmarks import cell, chain, segments, speed, verification
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"
@@ -24,6 +24,7 @@ PARTS = {
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
+    "segments": (segments.against_segments, "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
     "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
@@ -44,6 +45,9 @@ MEANING = {
     "cell_mesh_error_rel": "that cell at 1.5 mm: error of (e, k pitch) at 20 and 50 kPa against strains extrapolated from 1 and 0.8 mm",
     "cell_stiffness_fd_rel": "that cell at 20 kPa, 2 mm: stiffness against central differences of forces, relative to roots of diagonals",
     "cell_stiffness_refinement_rel": "that cell at 50 kPa: largest eigenvalue of K(0.8 mm)^-1 K(1 mm) - 1",
+    "cell_vs_9_segment_step_cost_ratio": "one-sided-w10, 60 deg, h = 2 mm, steps of 5 kPa: CPU s a step, cell over 9 chambers",
+    "cell_vs_30_segment_step_cost_ratio": "the same over 30 chambers",
+    "cell_vs_segment_strain_rel": "that cell at 1 mm against the middle of 9 chambers, 20 and 50 kPa: |d(e, k pitch)| / (|k| pitch)",
     "sphere_max_rel_error": "inflated sphere: largest relative error of the inner radius at P/mu = 0.1 .. 0.8",
     "sphere_past_limit_rel_error": "the same under volume control through the limit point to a = 2.2: largest error of the pressure",
     "tube_max_rel_error": "tube held at its length: largest error of the inner radius at P/mu = 0.1 .. 0.6",

@@ -32,15 +32,16 @@ _SIDEWAYS[4, 2], _SIDEWAYS[5, 1] = -1, 1
 
 
 class CellProblem:
-    """Unknowns, residual and tangent of the cell of `segment` meshed at `path` (geometry.cell.mesh_cell).
+    """Unknowns, residual and tangent of the cell of `segment`; mesh: path of geometry.cell.mesh_cell's, or the mesh and its tags.
 
-    Any pitch of the periodic body will do, whatever its cut's place or shape. gauge: tags of the facets whose rigid fit is
-    the section frame; centre: X1 (mm) where that frame sits, in the middle of the pitch over which it is fitted.
+    Any pitch of the periodic body will do, whatever its cut's place or shape, and any object with a pitch, a width, a material
+    and a layer_material serves as segment. gauge: tags of the facets whose rigid fit is the section frame; centre: X1 (mm)
+    where that frame sits, in the middle of the pitch over which it is fitted. rollers: {facet tag: component of u that is zero}.
     """
 
-    def __init__(self, segment, path, gauge=(cad.CHANNEL,), centre=0.0):
+    def __init__(self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None):
         self.segment, comm = segment, MPI.COMM_SELF
-        self.mesh, self.cell_tags, self.facet_tags = compat.read_mesh(path, comm)
+        self.mesh, self.cell_tags, self.facet_tags = mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, comm)
         mesh = self.mesh
         self.space = compat.mixed_space(mesh)
         self.state = fem.Function(self.space)
@@ -54,7 +55,7 @@ class CellProblem:
         self._left = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
         self._right = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
         self._define_forms()
-        self._reduce()
+        self._reduce(rollers or {})
         self._define_gauge(gauge, centre)
         self.stretch = PrincipalStretch(self, self.cell_tags.indices[np.isin(self.cell_tags.values, (cad.BODY, cad.LAYER))])
 
@@ -88,7 +89,7 @@ class CellProblem:
         self._matrix = fem.petsc.create_matrix(self._tangent)
         self._vector = fem.petsc.create_vector(self._residual)
 
-    def _reduce(self):
+    def _reduce(self, rollers):
         """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p has -1."""
         pitch, n = self.segment.pitch, len(self.state.x.array)
         master = np.arange(n)
@@ -100,6 +101,9 @@ class CellProblem:
         used = np.zeros(n, bool)
         used[self.displacement_dofs] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True
+        for tag, component in rollers.items():
+            used[self.displacement_dofs[np.unique(surface.facet_nodes(self, tag)), component]] = False
+        used &= used[master]  # an image of a held node is held
         kept = np.unique(master[used])
         self.reduced = np.full(n, -1)
         self.reduced[kept] = np.arange(len(kept))
@@ -131,8 +135,9 @@ class CellProblem:
             along = ((self.nodes[integral.nodes, 0] + shift - centre) @ first[:, 0]) / size  # X1^2
             self.gauge_strains += along * _SIDEWAYS
             columns = self.reduced[self.displacement_dofs[integral.nodes]]
+            moving = columns >= 0
             for i, row in enumerate(rows):
-                gauge += sp.coo_matrix((row.ravel(), (columns.ravel(), np.full(row.size, i))), shape=gauge.shape).tocsr()
+                gauge += sp.coo_matrix((row[moving], (columns[moving], np.full(moving.sum(), i))), shape=gauge.shape).tocsr()
         self.gauge = gauge
 
     def expand(self, values):

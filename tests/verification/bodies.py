@@ -13,8 +13,9 @@ from hifi import compat
 INNER, PLANE_X, PLANE_Y, PLANE_Z, OUTER, END, END_Y, END_Z = range(1, 9)
 
 
-def round_body(folder, name, size):
-    """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or axis."""
+def round_body(folder, name, size, solid=1):
+    """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or axis;
+    solid: tag of its cells."""
     comm, path = MPI.COMM_WORLD, folder / f"{name}.msh"
     if comm.rank == 0:
         gmsh.initialize()
@@ -27,7 +28,7 @@ def round_body(folder, name, size):
             groups.setdefault(classify(gmsh.model.getBoundingBox(2, face)), []).append(face)
         for tag, faces in groups.items():
             gmsh.model.addPhysicalGroup(2, faces, tag)
-        gmsh.model.addPhysicalGroup(3, [volume], 1)
+        gmsh.model.addPhysicalGroup(3, [volume], solid)
         grading = gmsh.model.mesh.field.add("MathEval")
         gmsh.model.mesh.field.setString(grading, "F", f"{size}*{radius}")
         gmsh.model.mesh.field.setAsBackgroundMesh(grading)
@@ -62,9 +63,12 @@ def tube():
     return _octant(occ.cut([(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 2))], [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 1))])[0])
 
 
-def cylinder():
-    """Solid cylinder of radius 1 and length 1 along x."""
-    return gmsh.model.occ.addCylinder(0, 0, 0, 1, 0, 0, 1)
+def cylinder(layers=3):
+    """Solid cylinder of radius 1 and length 1 along x, its mesh the same on both ends."""
+    occ = gmsh.model.occ
+    disk = [(2, occ.addDisk(0, 0, 0, 1, 1))]
+    occ.rotate(disk, 0, 0, 0, 0, 1, 0, np.pi / 2)
+    return next(tag for dim, tag in occ.extrude(disk, 1, 0, 0, numElements=[layers]) if dim == 3)
 
 
 def _hollow_faces(box, end=3.0):
@@ -88,10 +92,10 @@ ROUND = {
 }
 
 
-def box(lengths, counts, move=None):
+def box(lengths, counts, move=None, solid=1):
     """(mesh, cell tags, facet tags) of a box from the origin, each of its (nx, ny, nz) bricks cut into 6 tetrahedra.
 
-    move: X (n, 3) -> (n, 3), where its vertices go; tags are those of the box before.
+    move: X (n, 3) -> (n, 3), where its vertices go; facet tags are those of the box before. solid: tag of its cells.
     """
     mesh = create_box(MPI.COMM_WORLD, [[0.0, 0.0, 0.0], list(lengths)], list(counts), CellType.tetrahedron)
     where, tags = [], []
@@ -105,7 +109,7 @@ def box(lengths, counts, move=None):
     cells = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
     if move is not None:
         mesh.geometry.x[:] = move(mesh.geometry.x)
-    return mesh, meshtags(mesh, 3, cells, np.ones(len(cells), np.int32)), meshtags(mesh, 2, facets[order], tags[order])
+    return mesh, meshtags(mesh, 3, cells, np.full(len(cells), solid, np.int32)), meshtags(mesh, 2, facets[order], tags[order])
 
 
 def strip(lengths, counts):

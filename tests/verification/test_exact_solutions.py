@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from tests.verification import closed_forms, exact_cases
+from tests.verification import cells, closed_forms, exact_cases
 
 BAR = 1e-3
 #: independent values that the closed forms must give
@@ -61,6 +62,12 @@ def test_torsion_and_stretch_of_a_cylinder(shared_directory):
 
 def test_flexure_of_a_block():
     assert_within(exact_cases.flexure())
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
+def test_cells_of_a_cylinder_and_of_a_block(shared_directory):
+    """Held strains: the same two exact solutions, without ends."""
+    assert_within(cells.torsion(shared_directory) + cells.flexure())
 
 
 @pytest.mark.parametrize("name", exact_cases.STRIP_LOADS)
