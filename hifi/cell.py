@@ -101,9 +101,10 @@ class CellProblem:
         used = np.zeros(n, bool)
         used[self.displacement_dofs] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True
+        held = np.zeros(n, bool)
         for tag, component in rollers.items():
-            used[self.displacement_dofs[np.unique(surface.facet_nodes(self, tag)), component]] = False
-        used &= used[master]  # an image of a held node is held
+            held[master[self.displacement_dofs[np.unique(surface.facet_nodes(self, tag)), component]]] = True
+        used &= ~held[master]
         kept = np.unique(master[used])
         self.reduced = np.full(n, -1)
         self.reduced[kept] = np.arange(len(kept))
