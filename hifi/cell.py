@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from scipy.spatial import cKDTree
 
 from geometry import cad
-from geometry.cell import AIR
+from geometry.cell import AIR, GAP
 from hifi import compat, surface
 from hifi.materials import energy_density
 
@@ -27,10 +27,13 @@ DEGREE = 4
 
 
 class CellProblem:
-    """Unknowns, residual and tangent of the cell of `segment` meshed at `path` (geometry.cell.mesh_cell)."""
+    """Unknowns, residual and tangent of the cell of `segment` meshed at `path` (geometry.cell.mesh_cell).
 
-    def __init__(self, segment, path):
-        self.segment, comm = segment, MPI.COMM_SELF
+    medium: a hifi.contact.ThirdMedium that fills the gaps, which must be meshed then.
+    """
+
+    def __init__(self, segment, path, medium=None):
+        self.segment, self.medium, comm = segment, medium, MPI.COMM_SELF
         self.mesh, self.cell_tags, self.facet_tags = compat.read_mesh(path, comm)
         mesh = self.mesh
         self.space = compat.mixed_space(mesh)
@@ -58,13 +61,22 @@ class CellProblem:
         X = ufl.SpatialCoordinate(mesh)
         y = ufl.as_vector((0, X[1], X[2])) + u
         stretch = ufl.as_vector([q[i] for i in range(3)]) + ufl.cross(ufl.as_vector([q[i] for i in range(3, 6)]), y)
-        F = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]]) + ufl.outer(stretch, ufl.unit_vector(0, 3))
+        grad_y = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]])
+        E1 = ufl.unit_vector(0, 3)
+        F = grad_y + ufl.outer(stretch, E1)
         J = ufl.det(F)
         energies = (
             (energy_density(mesh, material, F, p), solid),
             *((energy_density(mesh, m, F, p), dx(cad.LAYER)) for m in [self.segment.layer_material] if m is not None),
             (-self.pressure * J + AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * J), air),
         )
+        if self.medium:
+            # d(Q F)/dX, rotated back: F's own gradient, and along X1 that of the screw
+            k = ufl.as_matrix([[0, -q[5], q[4]], [q[5], 0, -q[3]], [-q[4], q[3], 0]])
+            a, b, c = ufl.indices(3)
+            kF, ky = k * F, k * grad_y
+            second = ufl.as_tensor(ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c))
+            energies += ((self.medium.energy(mesh, F, second, material.mu), dx(GAP)),)
         residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
         slope = sum(ufl.inner(ufl.diff(w, q), self._left) * d for w, d in energies)
         curvature = sum(ufl.inner(ufl.diff(ufl.inner(ufl.diff(w, q), self._left), q), self._right) * d for w, d in energies)
@@ -89,7 +101,7 @@ class CellProblem:
             if len(low) != len(high) or distance.max() > 1e-5:
                 raise ValueError("the cell's mesh is not periodic")
             master[dofs[high]] = dofs[low[match]]
-        solid = self.cell_tags.indices[self.cell_tags.values != AIR]
+        solid = self.cell_tags.indices[~np.isin(self.cell_tags.values, (AIR, GAP))]
         used = np.zeros(n, bool)
         used[self.displacement_dofs] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True
@@ -126,6 +138,10 @@ class CellProblem:
     def expand(self, values):
         """State array of the mixed space from the unknowns (unknowns,)."""
         return np.where(self.reduced >= 0, values[self.reduced], 0.0)
+
+    def displacement(self, array=None):
+        """(nodes, 3) displacement u in mm of the P2 nodes."""
+        return (self.state.x.array if array is None else array)[self.displacement_dofs]
 
     def _vector_of(self, form):
         with self._vector.localForm() as local:
