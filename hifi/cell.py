@@ -29,13 +29,14 @@ DEGREE = 4
 class CellProblem:
     """Unknowns, residual and tangent of the cell of `segment` meshed at `path` (geometry.cell.mesh_cell).
 
-    medium: a hifi.contact.ThirdMedium that fills the gaps, which must be meshed then.
+    medium: a hifi.contact.ThirdMedium that fills the gaps, which must be meshed then; without it, meshed gaps are void.
     """
 
     def __init__(self, segment, path, medium=None):
-        self.segment, self.medium, comm = segment, medium, MPI.COMM_SELF
+        self.segment, comm = segment, MPI.COMM_SELF
         self.mesh, self.cell_tags, self.facet_tags = compat.read_mesh(path, comm)
         mesh = self.mesh
+        self.medium = medium.on(mesh) if medium else None
         self.space = compat.mixed_space(mesh)
         self.state = fem.Function(self.space)
         self.displacement_space, to_mixed = self.space.sub(0).collapse()
@@ -76,7 +77,8 @@ class CellProblem:
             a, b, c = ufl.indices(3)
             kF, ky = k * F, k * grad_y
             second = ufl.as_tensor(ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c))
-            energies += ((self.medium.energy(mesh, F, second, material.mu), dx(GAP)),)
+            energies += ((self.medium.density(F, second, material.mu), dx(GAP)),)
+            self._contact = compat.compile_form(ufl.derivative(energies[-1][0] * dx(GAP), self.state, v))
         residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
         slope = sum(ufl.inner(ufl.diff(w, q), self._left) * d for w, d in energies)
         curvature = sum(ufl.inner(ufl.diff(ufl.inner(ufl.diff(w, q), self._left), q), self._right) * d for w, d in energies)
@@ -103,7 +105,8 @@ class CellProblem:
             master[dofs[high]] = dofs[low[match]]
         solid = self.cell_tags.indices[~np.isin(self.cell_tags.values, (AIR, GAP))]
         used = np.zeros(n, bool)
-        used[self.displacement_dofs] = True
+        there = self.cell_tags.indices[(self.cell_tags.values != GAP) | (self.medium is not None)]
+        used[self.displacement_dofs[compat.cell_dofs(self.displacement_space)[there]]] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True
         kept = np.unique(master[used])
         self.reduced = np.full(n, -1)
@@ -178,6 +181,13 @@ class CellProblem:
                 self._right.value[:] = np.eye(6)[j]
                 curvature[i, j] = curvature[j, i] = fem.assemble_scalar(self._curvature)
         return matrix, mixed, curvature
+
+    def contact_forces(self):
+        """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their X1."""
+        with self._vector.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(self._vector, self._contact)
+        return -self._vector.array[self.displacement_dofs]
 
     def air_volume(self):
         """Volume (mm3) of the air in one pitch."""

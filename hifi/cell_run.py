@@ -15,14 +15,18 @@ from geometry.cell import mesh_cell
 from geometry.parameters import Segment
 from hifi.cell import CellProblem
 from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
+from hifi.contact import ThirdMedium, soften
 from hifi.control import LoadControl, VolumeControl
 from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath
-from hifi.stepping import StepSize, run_steps
+from hifi.stepping import StepSize, lagrange_coefficients, run_steps
 
 KPA = 1e3  # kPa per MPa
 STRAINS = ("e1", "e2", "e3", "k1_per_mm", "k2_per_mm", "k3_per_mm")
 CONTROLS = ("pressure", "volume")
+CONTACTS = ("auto", "none", "third-medium")
+#: iterations that a lagged tangent may still need in contact, where tangents age fast
+CONTACT_PATIENCE = 10.0
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,8 @@ class CellCase:
 
     held: {index of (e, k): prescribed value, 1/mm for k}; reached from the free state at the top pressure. control:
     'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor` times the volume at rest.
+    contact: 'third-medium', 'none', or 'auto': none until walls are seen to touch, and the third medium from there on (none
+    at all with control 'volume').
     """
 
     segment: Segment
@@ -40,18 +46,26 @@ class CellCase:
     held: dict = field(default_factory=dict)
     control: str = "pressure"
     volume_factor: float = 2.0
+    contact: str = "auto"
+    medium: ThirdMedium = ThirdMedium()
 
 
 def read_cell(path):
     """The CellCase in a TOML file; InputError with file, table and key otherwise."""
     data, where = read_toml(path), str(path)
-    refuse_unknown(data, ["pressure_kPa", "mesh_size_mm", "levels", "control", "volume_factor", "material", "segment", "held"], where)
+    known = ["pressure_kPa", "mesh_size_mm", "levels", "control", "volume_factor", "contact", "material", "segment", "held"]
+    refuse_unknown(data, known, where)
     for key in ("material", "segment"):
         if key not in data:
             raise InputError(f"{where}: key '{key}' is missing")
     control = data.get("control", "pressure")
     if control not in CONTROLS:
         raise InputError(f"{where}: control = {control!r} is not known: write 'pressure' or 'volume'")
+    contact = data.get("contact", CellCase.contact)
+    if contact not in CONTACTS:
+        raise InputError(f"{where}: contact = {contact!r} is not known: write 'auto', 'third-medium' or 'none'")
+    if contact == "third-medium" and control == "volume":
+        raise InputError(f"{where}: contact = 'third-medium' goes with control = 'pressure'")
     if control == "pressure" and "pressure_kPa" not in data:
         raise InputError(f"{where}: key 'pressure_kPa' is missing")
 
@@ -74,21 +88,61 @@ def read_cell(path):
     row.setdefault("chambers", 1)
     material = material_from_table(data["material"], f"{where} [material]")
     segment = from_table(Segment, row, f"{where} [segment]", material=material)
-    return CellCase(segment, pressure, float(mesh_size), levels, held, control, float(volume_factor))
+    return CellCase(segment, pressure, float(mesh_size), levels, held, control, float(volume_factor), contact)
 
 
-def solve_cell(case, mesh_path, on_state=lambda state: None):
+class _Touch(Exception):
+    """Walls overlap where contact was to be switched on."""
+
+
+def solve_cell(case, mesh_path, on_state=lambda state: None, on_touch=lambda pressure: None):
     """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns (last CellState, mesh facts).
 
-    ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
+    `on_touch(pressure)`: told the pressure (MPa) of first touch, once, before the first state beyond it. ConvergenceError
+    when the path ends short; what was recorded before has been seen by `on_state`.
     """
-    facts = mesh_cell(case.segment, case.mesh_size, mesh_path)
-    problem = CellProblem(case.segment, mesh_path)
-    mu, options = case.segment.material.mu, NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
+    facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=case.contact != "none")
+    seen = []
+
+    def see(state):
+        seen.append(state)
+        on_state(state)
+
+    if case.contact != "third-medium":
+        try:
+            return _follow(case, CellProblem(case.segment, mesh_path), see, on_touch), facts
+        except _Touch:
+            pass
+    problem = CellProblem(case.segment, mesh_path, case.medium)
+    return _follow(case, problem, see, on_touch, len(seen)), facts
+
+
+def _follow(case, problem, on_state, on_touch, known=0):
+    """Last CellState of the path, of which `on_state` has seen the first `known` states. _Touch when walls meet and `case`
+    wants contact from there on."""
+    medium, mu = problem.medium, case.segment.material.mu
+    options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
+    if medium:
+        options.patience = CONTACT_PATIENCE
     system = CellSystem(problem)
+    switch = case.contact == "auto" and case.control == "pressure"
+    distances = [(0.0, system.walls.distance())]
+    count, last = 0, []
+
+    def record():
+        nonlocal count
+        count += 1
+        if count > known:
+            kept = system.state.copy()
+            if medium:
+                soften(system, medium, options)
+            last[:] = [system.measure()]
+            if medium:
+                medium.softening, system.state = 0.0, kept
+            on_state(last[0])
+
     try:
-        last = [system.measure()]
-        on_state(last[0])
+        record()
         rest = system.volume()
         if case.control == "volume":
             start, target = rest, rest * case.volume_factor
@@ -100,18 +154,31 @@ def solve_cell(case, mesh_path, on_state=lambda state: None):
         path = EquilibriumPath(system, control, options, start)
 
         def keep(step):
+            if not medium and distances[-1][1] > 0:
+                distances.append((problem.pressure.value.item(), system.walls.distance()))
+                if distances[-1][1] <= 0:
+                    on_touch(_first_touch(distances))
+                    if switch:
+                        raise _Touch
             if step.load in marks:
-                last[:] = [system.measure()]
-                on_state(last[0])
+                record()
+                path.newton.current &= not medium
 
         run_steps(path, target, StepSize(first, 1e-4 * first, milestones=marks), keep)
         if case.held:
             system = _hold(problem, system, case, options)
-            last[:] = [system.measure()]
-            on_state(last[0])
-        return last[0], facts
+            if switch and not medium and system.walls.distance() <= 0:
+                raise _Touch
+            record()
+        return last[0]
     finally:
         system.destroy()
+
+
+def _first_touch(distances):
+    """Pressure at which the wall distance passes zero, from (pressure, distance) of which the last is the first below zero."""
+    pressures, gaps = np.array(distances[-3:]).T
+    return float(sum(p * w for p, w in zip(pressures, lagrange_coefficients(gaps, 0.0))))
 
 
 def _hold(problem, free, case, options):
@@ -128,9 +195,20 @@ def _hold(problem, free, case, options):
     return system
 
 
+def _contact(state):
+    """The contact columns of a state: zero force without contact."""
+    c = state.contact
+    return [c.force, c.area, c.nearest, c.farthest] if c else [0.0, 0.0, np.nan, np.nan]
+
+
+def _pushing(state):
+    return f"  contact force {state.contact.force:.3f} N" if state.contact else ""
+
+
 HEADER = [
     *"pressure_kPa volume_mm3 e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm k_norm_per_mm k_dot_e_per_mm".split(),
     *"force1_N force2_N force3_N moment1_N_mm moment2_N_mm moment3_N_mm unstable_directions".split(),
+    *"wall_distance_mm walls_overlap contact_force_N contact_area_mm2 contact_nearest_mm contact_farthest_mm".split(),
     *(f"K{i}{j}" for i in range(1, 7) for j in range(1, 7)),
     *(f"kirchhoff{i}{j}" for i in range(1, 5) for j in range(1, 5)),
 ]
@@ -146,17 +224,24 @@ def run_cell(path, directory, say=print):
         e, k = state.strains.e, state.strains.k
         rows.append(
             [state.pressure * KPA, state.volume, *e, *k, np.linalg.norm(k), k @ e, *state.force, *state.moment, state.unstable]
+            + [state.wall_distance, int(state.walls_overlap), *_contact(state)]
             + [*state.stiffness.ravel(), *state.kirchhoff_stiffness.ravel()]
         )
         write_csv(out / "cell.csv", HEADER, rows)
         say(
             f"{state.pressure * KPA:7.2f} kPa  e1 {e[0]:.4f}  k1 {k[0] * 1e3:.2f} rad/m  k2 {k[1] * 1e3:.2f} 1/m  k3 {k[2] * 1e3:.2f} 1/m  "
-            f"volume {state.volume:.1f} mm3  {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}"
+            f"volume {state.volume:.1f} mm3  {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}  "
+            f"wall distance {state.wall_distance:.3f} mm{_pushing(state)}{'  WALLS OVERLAP' * state.walls_overlap}"
         )
 
-    status, facts = "reached what was asked for", {}
+    def touch(pressure):
+        touched.append(pressure * KPA)
+        then = "beyond it states are marked 'walls overlap'" if case.contact == "none" or case.control == "volume" else "going on with contact"
+        say(f"walls touch at {touched[0]:.2f} kPa; {then}")
+
+    status, facts, touched = "reached what was asked for", {}, []
     try:
-        _, facts = solve_cell(case, out / "cell.msh", keep)
+        _, facts = solve_cell(case, out / "cell.msh", keep, touch)
     except ConvergenceError as error:
         status = str(error)
     write_record(
@@ -164,6 +249,9 @@ def run_cell(path, directory, say=print):
         status=status,
         segment=to_table(case.segment) | {"material": material_to_table(case.segment.material)},
         control=case.control,
+        contact=case.contact,
+        first_touch_kPa=touched[0] if touched else None,
+        walls_overlap=any(row[HEADER.index("walls_overlap")] for row in rows),
         mesh={"mesh_size_mm": case.mesh_size, **facts},
         wall_seconds=time.perf_counter() - started,
     )

@@ -8,6 +8,7 @@ from petsc4py import PETSc
 
 from base.strains import RodStrains
 from hifi.solver import DirectSolver
+from hifi.walls import CellWalls
 
 #: of mu pitch^2, the size of the forces in a cell
 RELATIVE_TOLERANCE = 1e-9
@@ -18,7 +19,8 @@ class CellState:
     """One equilibrium, per undeformed length: strains (e, k); force (N) and moment (N mm) in the section frame.
 
     stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure in MPa;
-    unstable: directions in which the cell is unstable at this pressure (its free strains included).
+    unstable: directions in which the cell is unstable at this pressure (its free strains included). wall_distance: smallest
+    signed distance (mm) of neighbouring chambers' walls; walls_overlap: it is negative and there was no contact model. contact: hifi.walls.WallContact of the worst gap; None without contact.
     """
 
     pressure: float
@@ -28,6 +30,12 @@ class CellState:
     stiffness: np.ndarray
     volume: float
     unstable: int
+    wall_distance: float
+    contact: object = None
+
+    @property
+    def walls_overlap(self):
+        return self.wall_distance < 0 and self.contact is None
 
     @property
     def kirchhoff_stiffness(self):
@@ -54,6 +62,7 @@ class CellSystem:
         n = problem.unknowns
         self._x = np.concatenate([np.zeros(n + 6), self._strains[0]])
         self._solver = self._matrix = None
+        self.walls = CellWalls(problem)
         self.load = 0.0
         self.state = self.at_supports(self._x)
 
@@ -177,6 +186,8 @@ class CellSystem:
             self._condensed / self.pitch,
             self.problem.air_volume(),
             self.unstable,
+            self.walls.distance(),
+            self.walls.contact(float(self.problem.pressure.value)) if self.problem.medium else None,
         )
 
     def destroy(self):

@@ -1,33 +1,113 @@
-"""Third-medium contact."""
+"""Third-medium contact: the gap between two walls is filled with a medium that is soft until it is nearly squeezed out.
 
+Wriggers, Schroeder & Schwarz (Comput. Mech. 52, 2013) put a medium where bodies may touch; Bluhm, Sigmund & Poulios (Comput.
+Mech. 67, 2021) keep its elements in shape by penalising second gradients. Here, with J = det F and per undeformed volume,
+    psi = gamma mu [5/6 L^2 + (|F|^2 - 3 - 2 L)/2] + kr mu/2 |grad F|^2 exp(-5 J+),
+L = ln J down to J0 and its quadratic continuation below, J+ a smooth positive part of J. The medium transmits pressure without
+friction. It also stiffens gaps that are open: a bias that vanishes with gamma, while a soft medium is hard to follow along
+the load. So the path is followed with a stiff medium, and at each load that is recorded the medium is softened with
+everything else held (`soften`), which is a path of its own with steps that fail and are cut back.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
+from hifi.control import LoadControl
+from hifi.path import EquilibriumPath
+from hifi.stepping import StepSize, run_steps
 
+#: smooth positive part of J: (J + sqrt(J^2 + s^2))/2
+_SMOOTH = 0.01
+_DECAY = 5.0
+
+
+@dataclass(frozen=True)
 class ThirdMedium:
-    def __init__(self, kind="log", gamma=5e-4, kr=10.0, alpha=5.0, J0=0.01, eps=0.01, **k):
-        self.kind, self.gamma0, self.kr0, self.alpha, self.J0, self.eps, self.k = kind, gamma, kr, alpha, J0, eps, k
+    """gamma: shear modulus over the body's, (followed, recorded); regularisation kr in mm2 and J0 likewise."""
 
-    def energy(self, mesh, F, second, mu):
-        C = lambda v: fem.Constant(mesh, PETSc.ScalarType(v))
-        self.gamma, self.kr, self.ks = C(self.gamma0), C(self.kr0), C(self.k.get("ks", 0.0))
+    gamma: tuple = (5e-4, 2e-5)
+    regularisation: tuple = (5e-3, 1e-3)
+    smallest_volume: tuple = (0.01, 0.01)
+
+    def on(self, mesh):
+        """The medium's MediumEnergy on a mesh."""
+        return MediumEnergy(self, mesh)
+
+    def scaled(self, factor):
+        """The medium with all of its stiffness, gamma and kr, times `factor`."""
+        gamma, regularisation = (tuple(factor * v for v in pair) for pair in (self.gamma, self.regularisation))
+        return ThirdMedium(gamma, regularisation, self.smallest_volume)
+
+
+class MediumEnergy:
+    """The energy with its parameters as constants that `softening` sets: 0 the followed, 1 the recorded medium."""
+
+    def __init__(self, medium, mesh):
+        self._ends = np.log([medium.gamma, medium.regularisation, medium.smallest_volume])
+        self._constants = [fem.Constant(mesh, PETSc.ScalarType(1.0)) for _ in self._ends]
+        self.softening = 0.0
+
+    @property
+    def softening(self):
+        return self._softening
+
+    @softening.setter
+    def softening(self, value):
+        self._softening = value
+        for constant, (followed, recorded) in zip(self._constants, self._ends):
+            constant.value = np.exp((1 - value) * followed + value * recorded)
+
+    def density(self, F, second, mu):
+        """UFL energy density (MPa); second: the third-order tensor grad F (1/mm)."""
+        gamma, kr, J0 = self._constants
         J = ufl.det(F)
-        J0, alpha, eps = C(self.J0), C(self.alpha), C(self.eps)
-        soft = (J + ufl.sqrt(J * J + eps**2)) / 2
-        reg = self.kr * mu / 2 * ufl.inner(second, second) * ufl.exp(-alpha * soft)
-        I1 = ufl.inner(F, F)
-        if self.kind == "log":
-            x = (J - J0) / J0
-            L = ufl.conditional(ufl.gt(J, J0), ufl.ln(ufl.max_value(J, J0)), ufl.ln(J0) + x - x * x / 2)
-            w = self.gamma * mu * (5 / 6 * L * L + (I1 - 3 - 2 * L) / 2)
-        elif self.kind == "pen":  # p = mu kappa ((Jc - J)+ / Jc)^n
-            Jc, n = C(self.k["Jc"]), self.k.get("n", 2)
-            z = ufl.max_value(Jc - J, 0.0) / Jc
-            w = self.gamma * mu * Jc * z ** (n + 1) / (n + 1) + self.ks * mu / 2 * (I1 - 2 * J)
-        elif self.kind == "pow":  # energy gamma mu J^-n, continued quadratically below J0
-            n = self.k.get("n", 2)
-            Jm = ufl.max_value(J, J0)
-            x = ufl.min_value(J - J0, 0.0)
-            w = self.gamma * mu * (Jm ** (-n) - n * J0 ** (-n - 1) * x + n * (n + 1) * J0 ** (-n - 2) * x * x / 2) + self.ks * mu / 2 * (I1 - 2 * J)
-        return w + reg
+        x = (J - J0) / J0
+        L = ufl.conditional(ufl.gt(J, J0), ufl.ln(ufl.max_value(J, J0)), ufl.ln(J0) + x - x * x / 2)
+        positive = (J + ufl.sqrt(J * J + _SMOOTH**2)) / 2
+        shape = kr / 2 * ufl.inner(second, second) * ufl.exp(-_DECAY * positive)
+        return mu * (gamma * (5 / 6 * L * L + (ufl.inner(F, F) - 3 - 2 * L) / 2) + shape)
+
+
+class Softening:
+    """`system` (hifi.newton) with the medium's softening as its load; the system's own load stays."""
+
+    def __init__(self, system, energy):
+        self._system, self._energy = system, energy
+
+    def __getattr__(self, name):
+        return getattr(self._system, name)
+
+    @property
+    def state(self):
+        return self._system.state
+
+    @state.setter
+    def state(self, value):
+        self._system.state = value
+
+    @property
+    def load(self):
+        return self._energy.softening
+
+    @load.setter
+    def load(self, value):
+        self._energy.softening = value
+
+    def load_gradient(self):
+        """By a difference: the medium's part of the residual is all but exponential in the softening."""
+        kept, step, ends = self.load, 1e-5, []
+        for value in (kept - step, kept + step):
+            self.load = value
+            ends.append(self.residual()[0])
+        self.load = kept
+        return (ends[1] - ends[0]) / (2 * step)
+
+
+def soften(system, energy, options):
+    """Walk from the followed medium's equilibrium to the recorded one's; StepResult. ConvergenceError when it ends short."""
+    path = EquilibriumPath(Softening(system, energy), LoadControl(), options)
+    return run_steps(path, 1.0, StepSize(0.5, 1e-3))

@@ -4,6 +4,8 @@ gap is the screw-periodic image of the other chamber's.
 Signed, between the deformed surfaces: negative = overlap, a point of one wall lies behind the other wall's surface.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -15,6 +17,20 @@ _TOLERANCE = 1e-6
 _NEIGHBOURS = 8
 #: flat triangles along a facet's edge; the sagitta of a wall's curvature between them is microns
 _DIVISIONS = 4
+
+
+#: walls are in contact where they push at each other with more than this part of the air's pressure
+IN_CONTACT = 0.1
+
+
+@dataclass(frozen=True)
+class WallContact:
+    """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm) met there."""
+
+    force: float
+    area: float
+    nearest: float
+    farthest: float
 
 
 class WallDistances:
@@ -98,9 +114,29 @@ class CellWalls:
         return np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
 
     def distance(self):
-        """Smallest signed distance in mm; inf when nothing faces nothing."""
+        """Smallest signed distance in mm."""
         pairs = [[self.positions(wall) for wall in gap] for gap in self.gaps]
-        return min((min(wall_distance(a, b), wall_distance(b, a)) for a, b in pairs), default=np.inf)
+        return min(min(wall_distance(a, b), wall_distance(b, a)) for a, b in pairs)
+
+    def contact(self, pressure):
+        """WallContact of the gap with the largest force, `pressure` (MPa) being that of the air."""
+        return max((self._contact(gap, pressure) for gap in self.gaps), key=lambda c: c.force)
+
+    def _contact(self, gap, pressure):
+        (facets, shift), other = gap
+        e, k = np.split(self.problem.strains.value, 2)
+        s = self.problem.nodes[facets][..., :1] + shift[:, None, None]
+        rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
+        forces = np.einsum("...ij,...j->...i", rotation, self.problem.contact_forces()[facets]).reshape(-1, 3)
+        # a node of a cut lies on both sides of it, with a share of the force on each
+        _, first, inverse = np.unique(np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True)
+        forces, x = forces[first], self.positions(gap[0]).reshape(-1, 3)[first]
+        shares = np.outer(surface.reference_areas(self.problem, facets), [0, 0, 0, 1 / 3, 1 / 3, 1 / 3])
+        areas = np.bincount(inverse.ravel(), shares.ravel())
+        total = np.linalg.norm(forces.sum(axis=0))
+        touching = (areas > 0) & (forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas)
+        distances = distances_from(self.positions(other), x)[touching]
+        return WallContact(float(total), float(areas[touching].sum()), float(distances.min(initial=np.inf)), float(distances.max(initial=-np.inf)))
 
 
 def wall_distance(points, wall):
