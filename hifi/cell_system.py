@@ -1,6 +1,6 @@
 """The unit cell as a system for Newton's method, and what an equilibrium of it says about the rod."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from mpi4py import MPI
@@ -21,6 +21,7 @@ class CellState:
     stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure in MPa;
     unstable: directions in which the cell is unstable at this pressure (its free strains included). wall_distance: smallest
     signed distance (mm) of neighbouring chambers' walls; walls_overlap: it is negative and there was no contact model. contact: hifi.walls.WallContact of the worst gap; None without contact.
+    array: the mixed state of the problem (hifi.cell), what pictures and checks are made of.
     """
 
     pressure: float
@@ -32,6 +33,7 @@ class CellState:
     unstable: int
     wall_distance: float
     contact: object = None
+    array: np.ndarray | None = field(default=None, repr=False)
 
     @property
     def walls_overlap(self):
@@ -188,6 +190,7 @@ class CellSystem:
             self.unstable,
             self.walls.distance(),
             self.walls.contact(float(self.problem.pressure.value)) if self.problem.medium else None,
+            self.problem.state.x.array.copy(),
         )
 
     def destroy(self):
