@@ -27,10 +27,7 @@ class PenaltyCell(CellProblem):
     def __init__(self, segment, path, walls, eps=1.0):
         super().__init__(segment, path)
         self.walls, self.eps = walls(self), eps
-        n = _DIVISIONS
-        corners = np.array([[(i, j), (i + 1, j), (i, j + 1)] for i in range(n) for j in range(n - i)]
-                           + [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i in range(n) for j in range(n - i - 1)]) / n
-        self._shape = surface.p2_shape(np.concatenate([1 - corners.sum(axis=-1, keepdims=True), corners], axis=-1))  # (t, 3, 6)
+        self._shape = surface.subdivision(_DIVISIONS)
         self._gauss = surface.p2_shape(surface._BARYCENTRIC)
 
     def _pose(self, strains, s):
@@ -39,7 +36,7 @@ class PenaltyCell(CellProblem):
     def contacts(self):
         """Rows of the gaps' gradients: (g (m,), weights (m,), G (m, unknowns), H (m, 6), force (gaps, 3))."""
         u, q = self.displacement(), np.array(self.strains.value)
-        gs, ws, cols, vals, rows, hs, forces, count = [], [], [], [], [], [], [], 0
+        gs, ws, cols, vals, hs, forces = [], [], [], [], [], []
         for (fa, sa), (fb, sb) in self.walls.gaps:
             state = []
             for f, shift in ((fa, sa), (fb, sb)):
@@ -69,7 +66,7 @@ class PenaltyCell(CellProblem):
             offset = points - c
             g = np.einsum("ni,ni->n", offset, normal)
             on = np.flatnonzero((g < 0) & (np.abs(g) > 0.9 * np.linalg.norm(offset, axis=1)) & (g > -0.5))
-            bary = np.linalg.lstsq  # barycentrics of c in T, by areas
+            # barycentrics of the closest point, by areas
             a, b, cc = T[on, 0], T[on, 1], T[on, 2]
             n2 = np.cross(b - a, cc - a)
             d = np.einsum("ni,ni->n", n2, n2)
@@ -106,7 +103,6 @@ class PenaltyCell(CellProblem):
         matrix, mixed, curvature = super().tangent()
         g, w, G, H, _ = self.contacts()
         W = sp.diags(self.eps * w)
-        n = self.unknowns
         extra = sp.bmat([[G.T @ W @ G, None], [None, sp.csr_matrix((6, 6))]], format="csr")
         return (matrix + extra).tocsr(), mixed + G.T @ (W @ H), curvature + H.T @ (W @ H)
 
@@ -123,8 +119,8 @@ class PenaltySystem(CellSystem):
 
 
 def solve(problem, pressure, state, strains, stiffnesses=(1.0, 4.0, 16.0), say=lambda text: None):
-    """(forces (gaps, 3) in N, strains (6,), deepest penetration in mm) at `pressure` (MPa), from a mixed `state` array and
-    strains close by, for each of growing `stiffnesses` (MPa/mm)."""
+    """[(forces (gaps, 3) in N, strains (6,), deepest penetration in mm)] at `pressure` (MPa) for each of growing
+    `stiffnesses` (MPa/mm), from a mixed `state` array and strains close by."""
     system = PenaltySystem(problem)
     system.load = pressure
     x = np.zeros(problem.unknowns + 12)
@@ -140,6 +136,6 @@ def solve(problem, pressure, state, strains, stiffnesses=(1.0, 4.0, 16.0), say=l
         result = newton.solve(pressure)
         g, _, _, _, forces = problem.contacts()
         out.append((forces, system.state[-6:].copy(), float(g.min(initial=0.0))))
-        say(f"eps {eps}: {result.iterations} iterations, {np.linalg.norm(forces, axis=1)} N, strains {out[-1][1]}, penetration {out[-1][2]}")
+        say(f"{eps} MPa/mm: {result.iterations} iterations, {np.linalg.norm(forces, axis=1)} N, {out[-1][2]:.4f} mm, {out[-1][1]}")
     system.destroy()
     return out

@@ -236,7 +236,8 @@ def run_cell(path, directory, say=print):
 
     def touch(pressure):
         touched.append(pressure * KPA)
-        then = "beyond it states are marked 'walls overlap'" if case.contact == "none" or case.control == "volume" else "going on with contact"
+        alone = case.contact == "none" or case.control == "volume"
+        then = "beyond it states are marked 'walls overlap'" if alone else "going on with contact"
         say(f"walls touch at {touched[0]:.2f} kPa; {then}")
 
     status, facts, touched = "reached what was asked for", {}, []

@@ -20,8 +20,9 @@ class CellState:
 
     stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure in MPa;
     unstable: directions in which the cell is unstable at this pressure (its free strains included). wall_distance: smallest
-    signed distance (mm) of neighbouring chambers' walls; walls_overlap: it is negative and there was no contact model. contact: hifi.walls.WallContact of the worst gap; None without contact.
-    array: the mixed state of the problem (hifi.cell), what pictures and checks are made of.
+    signed distance (mm) of neighbouring chambers' walls; walls_overlap: it is negative and there was no contact model.
+    contact: hifi.walls.WallContact of the gap with the largest force, None without contact. array: the mixed state of the
+    problem (hifi.cell), what pictures and checks are made of.
     """
 
     pressure: float

@@ -61,14 +61,18 @@ def p2_shape(barycentric):
     return np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=-1)
 
 
-def subdivided(facets, divisions):
-    """(facets divisions^2, 3, 3) flat triangles between points of quadratic facets (facets, 6, 3), same orientation."""
+def subdivision(divisions):
+    """(divisions^2, 3, 6) quadratic shape functions at the corners of a facet's flat parts, of its own orientation."""
     n = divisions
     up = [[(i, j), (i + 1, j), (i, j + 1)] for i in range(n) for j in range(n - i)]
     down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i in range(n) for j in range(n - i - 1)]
     corners = np.array(up + down) / n
-    barycentric = np.concatenate([1 - corners.sum(axis=-1, keepdims=True), corners], axis=-1)
-    return np.einsum("tcn,fni->ftci", p2_shape(barycentric), facets).reshape(-1, 3, 3)
+    return p2_shape(np.concatenate([1 - corners.sum(axis=-1, keepdims=True), corners], axis=-1))
+
+
+def subdivided(facets, divisions):
+    """(facets divisions^2, 3, 3) flat triangles between points of quadratic facets (facets, 6, 3), same orientation."""
+    return np.einsum("tcn,fni->ftci", subdivision(divisions), facets).reshape(-1, 3, 3)
 
 
 def _clip(polygon, values, keep_below):

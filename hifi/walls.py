@@ -84,7 +84,7 @@ class CellWalls:
     """The walls of a cell's gaps, put together from the pieces that its cuts leave.
 
     gaps: a pair of walls for each side of the body, the second facing the first across the gap; each is (facets (n, 6) of
-    nodes, shift (n,) in whole pitches, mm, that brings a piece to its wall).
+    nodes, shift (n,) in mm, whole pitches that bring a piece to its wall).
     """
 
     def __init__(self, problem):
@@ -97,12 +97,10 @@ class CellWalls:
         for side in s.sides:
             above = (side * corners[:, :, 2]).min(axis=1) > s.core_top - _TOLERANCE
             along = (corners[:, :, 0] - side * s.cot * corners[:, :, 1]).mean(axis=1)
-            pair = []
-            for sign, offset in ((1, 0.0), (-1, s.gap / s.sin)):
-                chosen = np.flatnonzero(above & (sign * slope > 0.1))
-                plane = along[chosen[0]] if sign > 0 else plane
-                pair.append((facets[chosen], s.pitch * np.round((plane + offset - along[chosen]) / s.pitch)))
-            self.gaps.append(pair)
+            first, second = (np.flatnonzero(above & (sign * slope > 0.1)) for sign in (1, -1))
+            plane = along[first[0]]
+            places = ((first, plane), (second, plane + s.gap / s.sin))
+            self.gaps.append([(facets[c], s.pitch * np.round((x - along[c]) / s.pitch)) for c, x in places])
 
     def positions(self, wall, array=None):
         """(n, 6, 3) deformed positions of a wall's nodes, in the section frame at X1 = 0."""
@@ -136,7 +134,8 @@ class CellWalls:
         total = np.linalg.norm(forces.sum(axis=0))
         touching = (areas > 0) & (forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas)
         distances = distances_from(self.positions(other), x)[touching]
-        return WallContact(float(total), float(areas[touching].sum()), float(distances.min(initial=np.inf)), float(distances.max(initial=-np.inf)))
+        nearest, farthest = (distances.min(), distances.max()) if len(distances) else (np.nan, np.nan)
+        return WallContact(float(total), float(areas[touching].sum()), float(nearest), float(farthest))
 
 
 def wall_distance(points, wall):
