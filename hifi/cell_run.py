@@ -167,8 +167,10 @@ def _follow(case, problem, on_state, on_touch, known=0):
         run_steps(path, target, StepSize(first, 1e-4 * first, milestones=marks), keep)
         if case.held:
             system = _hold(problem, system, case, options)
-            if switch and not medium and system.walls.distance() <= 0:
-                raise _Touch
+            if not medium and distances[-1][1] > 0 and system.walls.distance() <= 0:
+                on_touch(case.pressure)
+                if switch:
+                    raise _Touch
             record()
         return last[0]
     finally:

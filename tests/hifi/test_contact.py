@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from base.errors import InputError
 from base.se3 import exp_rotation
 from geometry.cell import mesh_cell
 from hifi.cell import CellProblem
-from hifi.cell_run import CellCase, read_cell, solve_cell
+from hifi.cell_run import CellCase, solve_cell
 from hifi.contact import ThirdMedium
 from hifi.walls import CellWalls
 from tests.cases import CASES
@@ -72,11 +71,3 @@ def test_a_straight_medium_seen_from_a_twisting_frame_is_at_rest(tall, tmp_path)
     back = exp_rotation(-twist * X[:, :1] * [1.0, 0.0, 0.0])
     problem.state.x.array[problem.displacement_dofs] = np.einsum("nij,nj->ni", back, X * [0, 1, 1]) - X * [0, 1, 1]
     assert np.abs(problem.contact_forces()).max() < 0.02 * twisted  # what quadratic elements miss of the rotation
-
-
-def test_contact_is_one_of_three_words_and_follows_the_pressure(tmp_path):
-    path = tmp_path / "cell.toml"
-    for lines, message in (('contact = "glue"', "'auto'"), ('contact = "third-medium"\ncontrol = "volume"', "control = 'pressure'")):
-        path.write_text(f'pressure_kPa = 10\n{lines}\n[material]\nmu_MPa = 0.3\n[segment]\nkind = "twisting"\nangle_deg = 60\n')
-        with pytest.raises(InputError, match=message):
-            read_cell(path)
