@@ -200,7 +200,7 @@ def _hold(problem, free, case, options):
 def _contact(state):
     """The contact columns of a state: zero force without contact."""
     c = state.contact
-    return [c.force, c.area, c.nearest, c.farthest] if c else [0.0, 0.0, np.nan, np.nan]
+    return [c.force, c.area, c.nearest, c.farthest, c.gamma] if c else [0.0, 0.0, np.nan, np.nan, np.nan]
 
 
 def _pushing(state):
@@ -210,7 +210,7 @@ def _pushing(state):
 HEADER = [
     *"pressure_kPa volume_mm3 e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm k_norm_per_mm k_dot_e_per_mm".split(),
     *"force1_N force2_N force3_N moment1_N_mm moment2_N_mm moment3_N_mm unstable_directions".split(),
-    *"wall_distance_mm walls_overlap contact_force_N contact_area_mm2 contact_nearest_mm contact_farthest_mm".split(),
+    *"wall_distance_mm walls_overlap contact_force_N contact_area_mm2 contact_nearest_mm contact_farthest_mm contact_gamma".split(),
     *(f"K{i}{j}" for i in range(1, 7) for j in range(1, 7)),
     *(f"kirchhoff{i}{j}" for i in range(1, 5) for j in range(1, 5)),
 ]

@@ -16,6 +16,7 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
+from base.errors import ConvergenceError
 from hifi.control import LoadControl
 from hifi.path import EquilibriumPath
 from hifi.stepping import StepSize, run_steps
@@ -23,6 +24,8 @@ from hifi.stepping import StepSize, run_steps
 #: smooth positive part of J: (J + sqrt(J^2 + s^2))/2
 _SMOOTH = 0.01
 _DECAY = 5.0
+#: steps of the softening below this are given up
+SMALLEST_SOFTENING = 0.03
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,11 @@ class MediumEnergy:
         self._softening = value
         for constant, (followed, recorded) in zip(self._constants, self._ends):
             constant.value = np.exp((1 - value) * followed + value * recorded)
+
+    @property
+    def gamma(self):
+        """Shear modulus of the medium now, over the body's."""
+        return float(self._constants[0].value)
 
     def density(self, F, second, mu):
         """UFL energy density (MPa); second: the third-order tensor grad F (1/mm)."""
@@ -108,6 +116,10 @@ class Softening:
 
 
 def soften(system, energy, options):
-    """Walk from the followed medium's equilibrium to the recorded one's; StepResult. ConvergenceError when it ends short."""
+    """Walk from the followed medium's equilibrium towards the recorded one's; gamma of the last equilibrium on the way."""
     path = EquilibriumPath(Softening(system, energy), LoadControl(), options)
-    return run_steps(path, 1.0, StepSize(0.5, 1e-3))
+    try:
+        run_steps(path, 1.0, StepSize(0.5, SMALLEST_SOFTENING))
+    except ConvergenceError:
+        pass  # the path is back at the last equilibrium, which is recorded with its gamma
+    return energy.gamma

@@ -25,12 +25,16 @@ IN_CONTACT = 0.1
 
 @dataclass(frozen=True)
 class WallContact:
-    """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm) met there."""
+    """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm) met there.
+
+    gamma: stiffness of the medium that transmits it, over the body's.
+    """
 
     force: float
     area: float
     nearest: float
     farthest: float
+    gamma: float
 
 
 class WallDistances:
@@ -135,7 +139,7 @@ class CellWalls:
         touching = (areas > 0) & (forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas)
         distances = distances_from(self.positions(other), x)[touching]
         nearest, farthest = (distances.min(), distances.max()) if len(distances) else (np.nan, np.nan)
-        return WallContact(float(total), float(areas[touching].sum()), float(nearest), float(farthest))
+        return WallContact(float(total), float(areas[touching].sum()), float(nearest), float(farthest), self.problem.medium.gamma)
 
 
 def wall_distance(points, wall):
