@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, segments, speed, verification
+from benchmarks import cell, chain, contact, segments, speed, verification
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"
@@ -26,6 +26,7 @@ PARTS = {
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "segments": (segments.against_segments, "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
+    "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by penalty; some 20 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
     "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
     "scaling": (speed.scaling, "seconds of assembly, factorisation and solution on three meshes, and their exponents"),
@@ -59,6 +60,16 @@ MEANING = {
     "mms_order_u": "manufactured solution, 8^3 to 16^3 bricks: observed order of u in L2",
     "mms_order_p": "the same of p",
     "energy_balance_rel": "shipped body to 20 kPa: work of the pressure (Simpson, 16 intervals) against the stored energy",
+    "contact_tau_50kPa_rad_per_m": "cell twist-w15, 60 deg, h = 2 mm, contact: twist per deformed length at 50 kPa",
+    "contact_cost_factor": "that cell to 50 kPa in 5 recorded levels: CPU time with contact = auto over contact = none",
+    "contact_distance_rel_gap_60": "largest distance of solid walls, + or -, where they push with > 10 % of P, over the gap",
+    "contact_distance_rel_gap_45": "the same at 45 deg",
+    "contact_distance_rel_gap_75": "the same at 75 deg",
+    "contact_bias_twist_rel": "that cell at 98.5 % of the pressure of first touch: twist with the medium over without, minus 1",
+    "contact_bias_curvature_rel": "cell one-sided-w10, 60 deg, 50 kPa, never in contact: |k| with the medium over without, minus 1",
+    "contact_parameter_sensitivity_rel": "twist at 50 kPa: change when the medium's stiffness is halved or doubled, over what contact adds",
+    "contact_mesh_sensitivity_rel": "what contact adds to the twist at 50 kPa, h = 1.5 mm against 2 mm",
+    "contact_force_check_rel": "force between chambers, 10, 30, 50 kPa, third medium against wall penalty: largest difference",
     "long_segment_steps": "case one-sided-long, 26 chambers, 60 deg, 0-50 kPa, h = 2 mm: accepted steps",
     "long_segment_factorisations": "the same: factorisations, failed attempts included",
     "ramp_ratio_same_strategy_h2": "ramp twist-w12 at h = 2 mm, same predictor and lagging: our time over the faster of FElupe and NGSolve",

@@ -1,4 +1,7 @@
-"""One pitch of a uniform segment between two plane cuts, body and air both meshed, with matching faces on the cuts."""
+"""One pitch of a uniform segment between two plane cuts, with matching faces on the cuts.
+
+Body and air are both meshed, and on demand the gaps between neighbouring chambers, the medium of hifi.contact.
+"""
 
 from pathlib import Path
 
@@ -9,19 +12,19 @@ from base.errors import InputError
 from base.files import atomic_path
 from geometry import cad
 
-#: physical tag of the air's volume
-AIR = 200
+#: physical tags of the air's volume and of the gaps'
+AIR, GAP = 200, 400
 
 
-def mesh_cell(segment, mesh_size, path, cut=0.0):
+def mesh_cell(segment, mesh_size, path, cut=0.0, gaps=False):
     """Write the cell's mesh to `path`; returns {"body_mm3", "air_mm3", "cells"}.
 
-    x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). InputError when the faces on the two cuts
-    do not match or the mesh fails.
+    x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). `gaps`: mesh the space between the chambers
+    too. InputError when the faces on the two cuts do not match or the mesh fails.
     """
     half = segment.pitch / 2
     with cad.session("cell"):
-        body, air = _build(segment, half, cut)
+        body, air = _build(segment, half, cut, gaps)
         gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
         gmsh.option.setNumber("Mesh.RandomSeed", 1)
@@ -40,7 +43,7 @@ def mesh_cell(segment, mesh_size, path, cut=0.0):
     return facts
 
 
-def _build(segment, half, cut):
+def _build(segment, half, cut, gaps):
     """Volume tags (body, air) of the cell; faces and volumes tagged, cuts made periodic."""
     occ, s = gmsh.model.occ, segment
     reach = half + s.width / 2 * abs(s.cot) + s.pitch
@@ -57,21 +60,39 @@ def _build(segment, half, cut):
         slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
         solids.append(occ.intersect(cad.fuse(tags, unify), [(3, slab)])[0])
     layer = [(3, tag) for tag in cad.layer_solid(s, -half, half)]
-    _, parents = occ.fragment(solids[0], solids[1] + layer)
+    medium = _gap_solids(s, half, centres[:-1] + s.pitch / 2) if gaps else []
+    _, parents = occ.fragment(solids[0], solids[1] + layer + medium)
     occ.synchronize()
-    inner = len(solids[0]) + len(solids[1])
-    air, layer = ([t for _, t in sorted(cad.pieces(p))] for p in (parents[len(solids[0]) : inner], parents[inner:]))
+    ends = np.cumsum([len(solids[0]), len(solids[1]), len(layer), len(medium)])
+    air, layer, medium = ([t for _, t in sorted(cad.pieces(parents[a:b]))] for a, b in zip(ends, ends[1:]))
     body = sorted({t for _, t in cad.pieces(parents[: len(solids[0])])} - set(air))
     gmsh.model.addPhysicalGroup(3, sorted(set(body) - set(layer)), cad.BODY)
     if layer:
         gmsh.model.addPhysicalGroup(3, layer, cad.LAYER)
     gmsh.model.addPhysicalGroup(3, air, AIR)
+    if medium:
+        gmsh.model.addPhysicalGroup(3, medium, GAP)
     _make_periodic(half, s.pitch)
     interface = _boundary(body) & _boundary(air)
     channel = [f for f in interface if cad.in_channel(s, gmsh.model.getBoundingBox(2, f))]
     gmsh.model.addPhysicalGroup(2, sorted(channel), cad.CHANNEL)
     gmsh.model.addPhysicalGroup(2, sorted(interface - set(channel)), cad.CAVITY)
+    outer = [f for f in _boundary(body) - interface if not _on_cut(f, half)]
+    gmsh.model.addPhysicalGroup(2, sorted(outer), cad.OUTER)
     return body, air
+
+
+def _gap_solids(segment, half, centres):
+    """(dim, tag) of the space between neighbouring chambers, above the core and as wide as they are, between the cuts."""
+    s = segment
+    solids = [(3, cad.chamber_block(s, x, side, s.gap, s.width / 2, s.core_top, s.chamber_top)) for x in centres for side in s.sides]
+    slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
+    return gmsh.model.occ.intersect(solids, [(3, slab)])[0]
+
+
+def _on_cut(face, half):
+    x0, _, _, x1, _, _ = gmsh.model.getBoundingBox(2, face)
+    return x1 - x0 < 1e-5 and abs(abs(x0) - half) < 1e-5
 
 
 def _boundary(volumes):

@@ -19,7 +19,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from geometry import cad
-from geometry.cell import AIR
+from geometry.cell import AIR, GAP
 from hifi import compat, surface
 from hifi.materials import energy_density
 from hifi.stretch import PrincipalStretch
@@ -37,12 +37,14 @@ class CellProblem:
     Any pitch of the periodic body will do, whatever its cut's place or shape, and any object with a pitch, a width, a material
     and a layer_material serves as segment. gauge: tags of the facets whose rigid fit is the section frame; centre: X1 (mm)
     where that frame sits, in the middle of the pitch over which it is fitted. rollers: {facet tag: component of u that is zero}.
+    medium: a hifi.contact.ThirdMedium that fills the gaps, which must be meshed then; without it, meshed gaps are void.
     """
 
-    def __init__(self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None):
+    def __init__(self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None, medium=None):
         self.segment, comm = segment, MPI.COMM_SELF
         self.mesh, self.cell_tags, self.facet_tags = mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, comm)
         mesh = self.mesh
+        self.medium = medium.on(mesh) if medium else None
         self.space = compat.mixed_space(mesh)
         self.state = fem.Function(self.space)
         self.displacement_space, to_mixed = self.space.sub(0).collapse()
@@ -69,7 +71,9 @@ class CellProblem:
         X = ufl.SpatialCoordinate(mesh)
         y = ufl.as_vector((0, X[1], X[2])) + u
         stretch = ufl.as_vector([q[i] for i in range(3)]) + ufl.cross(ufl.as_vector([q[i] for i in range(3, 6)]), y)
-        F = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]]) + ufl.outer(stretch, ufl.unit_vector(0, 3))
+        grad_y = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]])
+        E1 = ufl.unit_vector(0, 3)
+        F = grad_y + ufl.outer(stretch, E1)
         self.deformation_gradient = F
         J = ufl.det(F)
         energies = (
@@ -77,6 +81,14 @@ class CellProblem:
             *((energy_density(mesh, m, F, p), dx(cad.LAYER)) for m in [self.segment.layer_material] if m is not None),
             (-self.pressure * J + AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * J), air),
         )
+        if self.medium:
+            # d(Q F)/dX, rotated back: F's own gradient, and along X1 that of the screw
+            k = ufl.as_matrix([[0, -q[5], q[4]], [q[5], 0, -q[3]], [-q[4], q[3], 0]])
+            a, b, c = ufl.indices(3)
+            kF, ky = k * F, k * grad_y
+            second = ufl.as_tensor(ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c))
+            energies += ((self.medium.density(F, second, material.mu), dx(GAP)),)
+            self._contact = compat.compile_form(ufl.derivative(energies[-1][0] * dx(GAP), self.state, v))
         residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
         slope = sum(ufl.inner(ufl.diff(w, q), self._left) * d for w, d in energies)
         curvature = sum(ufl.inner(ufl.diff(ufl.inner(ufl.diff(w, q), self._left), q), self._right) * d for w, d in energies)
@@ -97,9 +109,10 @@ class CellProblem:
         for coordinates, dofs in ((self.nodes, self.displacement_dofs), (points, self.pressure_dofs[:, None])):
             first = _same_modulo(coordinates, pitch)
             master[dofs] = dofs[first]
-        solid = self.cell_tags.indices[self.cell_tags.values != AIR]
+        solid = self.cell_tags.indices[~np.isin(self.cell_tags.values, (AIR, GAP))]
         used = np.zeros(n, bool)
-        used[self.displacement_dofs] = True
+        there = self.cell_tags.indices[(self.cell_tags.values != GAP) | (self.medium is not None)]
+        used[self.displacement_dofs[compat.cell_dofs(self.displacement_space)[there]]] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True
         held = np.zeros(n, bool)
         for tag, component in rollers.items():
@@ -145,6 +158,10 @@ class CellProblem:
         """State array of the mixed space from the unknowns (unknowns,)."""
         return np.where(self.reduced >= 0, values[self.reduced], 0.0)
 
+    def displacement(self, array=None):
+        """(nodes, 3) displacement u in mm of the P2 nodes."""
+        return (self.state.x.array if array is None else array)[self.displacement_dofs]
+
     def _vector_of(self, form):
         with self._vector.localForm() as local:
             local.set(0.0)
@@ -180,6 +197,13 @@ class CellProblem:
                 self._right.value[:] = np.eye(6)[j]
                 curvature[i, j] = curvature[j, i] = fem.assemble_scalar(self._curvature)
         return matrix, mixed, curvature
+
+    def contact_forces(self):
+        """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their X1."""
+        with self._vector.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(self._vector, self._contact)
+        return -self._vector.array[self.displacement_dofs]
 
     def air_volume(self):
         """Volume (mm3) of the air in one pitch."""

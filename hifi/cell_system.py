@@ -1,6 +1,6 @@
 """The unit cell as a system for Newton's method, and what an equilibrium of it says about the rod."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from mpi4py import MPI
@@ -8,6 +8,7 @@ from petsc4py import PETSc
 
 from base.strains import RodStrains
 from hifi.solver import DirectSolver
+from hifi.walls import CellWalls
 
 #: of mu pitch^2, the size of the forces in a cell
 RELATIVE_TOLERANCE = 1e-9
@@ -18,8 +19,11 @@ class CellState:
     """One equilibrium, per undeformed length: strains (e, k); force (N) and moment (N mm) in the section frame.
 
     stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure in MPa;
-    unstable: directions in which the cell is unstable at this pressure (its free strains included); steps, factorisations in
-    them and seconds: what it took to come here from rest (hifi.cell_run).
+    unstable: directions in which the cell is unstable at this pressure (its free strains included). wall_distance: smallest
+    signed distance (mm) of neighbouring chambers' walls; walls_overlap: it is negative and there was no contact model.
+    contact: hifi.walls.WallContact of the gap with the largest force, None without contact. array: the mixed state of the
+    problem (hifi.cell), what pictures and checks are made of. steps, factorisations in them and seconds: what it took to come
+    here from rest (hifi.cell_run).
     """
 
     pressure: float
@@ -30,6 +34,9 @@ class CellState:
     volume: float
     unstable: int
     largest_stretch: float
+    wall_distance: float
+    contact: object = None
+    array: np.ndarray | None = field(default=None, repr=False)
     steps: int = 0
     factorisations: int = 0
     seconds: float = 0.0
@@ -44,6 +51,10 @@ class CellState:
         e, k = self.strains.e, self.strains.k
         wrenches = np.array([np.concatenate([0 * k, k]), np.concatenate([k, e])])
         return wrenches @ np.linalg.solve(self.stiffness, wrenches.T)
+
+    @property
+    def walls_overlap(self):
+        return self.wall_distance < 0 and self.contact is None
 
     @property
     def kirchhoff_stiffness(self):
@@ -70,6 +81,7 @@ class CellSystem:
         n = problem.unknowns
         self._x = np.concatenate([np.zeros(n + 6), self._strains[0]])
         self._solver = self._matrix = None
+        self.walls = CellWalls(problem)
         self.load = 0.0
         self.state = self.at_supports(self._x)
 
@@ -194,6 +206,9 @@ class CellSystem:
             self.problem.air_volume(),
             self.unstable,
             self.problem.stretch.largest(),
+            self.walls.distance(),
+            self.walls.contact(float(self.problem.pressure.value)) if self.problem.medium else None,
+            self.problem.state.x.array.copy(),
         )
 
     def destroy(self):

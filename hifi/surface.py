@@ -15,7 +15,8 @@ for _opposite in range(4):
 def facet_nodes(problem, *tags):
     """(facets, 6) displacement nodes of the tagged facets on this rank, corners ordered so that normals point out.
 
-    A facet is reported by the rank that owns its cell, so that sums over ranks count it once.
+    A facet between two cells is seen from that with the lower tag: the body's. It is reported by the rank that owns its
+    cell, so that sums over ranks count it once.
     """
     topology = problem.mesh.topology
     topology.create_connectivity(2, 3)
@@ -23,10 +24,12 @@ def facet_nodes(problem, *tags):
     to_cell, to_facet = topology.connectivity(2, 3), topology.connectivity(3, 2)
     owned_cells = topology.index_map(3).size_local
     dofmap = problem.displacement_space.dofmap
+    tags_of_cells = np.zeros(owned_cells + topology.index_map(3).num_ghosts, int)
+    tags_of_cells[problem.cell_tags.indices] = problem.cell_tags.values
     rows = []
     for tag in tags:
         for facet in problem.facet_tags.find(tag):
-            cell = to_cell.links(facet)[0]
+            cell = min(to_cell.links(facet), key=tags_of_cells.__getitem__)
             if cell >= owned_cells:
                 continue
             local = int(np.flatnonzero(to_facet.links(cell) == facet)[0])
@@ -46,11 +49,6 @@ def reference_areas(problem, facets):
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
-def split(facets):
-    """(4 facets, 3) linear triangles of quadratic ones (facets, 6), same orientation."""
-    return np.concatenate([facets[:, [0, 3, 5]], facets[:, [3, 1, 4]], facets[:, [5, 4, 2]], facets[:, [3, 4, 5]]])
-
-
 # degree-4 rule on the triangle (Dunavant 1985): exact for P2 shape functions times linear coordinates
 _A4, _B4 = 0.445948490915965, 0.091576213509771
 _BARYCENTRIC = np.array([[1 - 2 * a if i == j else a for i in range(3)] for a in (_A4, _B4) for j in range(3)])
@@ -61,6 +59,20 @@ def p2_shape(barycentric):
     """(..., 6) quadratic shape functions at barycentric coordinates (..., 3); corners, then mid-edges 01, 12, 20."""
     a, b, c = np.moveaxis(barycentric, -1, 0)
     return np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=-1)
+
+
+def subdivision(divisions):
+    """(divisions^2, 3, 6) quadratic shape functions at the corners of a facet's flat parts, of its own orientation."""
+    n = divisions
+    up = [[(i, j), (i + 1, j), (i, j + 1)] for i in range(n) for j in range(n - i)]
+    down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i in range(n) for j in range(n - i - 1)]
+    corners = np.array(up + down) / n
+    return p2_shape(np.concatenate([1 - corners.sum(axis=-1, keepdims=True), corners], axis=-1))
+
+
+def subdivided(facets, divisions):
+    """(facets divisions^2, 3, 3) flat triangles between points of quadratic facets (facets, 6, 3), same orientation."""
+    return np.einsum("tcn,fni->ftci", subdivision(divisions), facets).reshape(-1, 3, 3)
 
 
 def _clip(polygon, values, keep_below):

@@ -1,20 +1,44 @@
-"""Smallest distance between the walls that face each other across the gaps of a segment."""
+"""Distance between the walls that face each other across the gaps of a segment, or of the unit cell, where one wall of a
+gap is the screw-periodic image of the other chamber's.
+
+Signed, between the deformed surfaces: negative = overlap, a point of one wall lies behind the other wall's surface.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from base import se3
 from geometry import cad
 from hifi import surface
 
 _TOLERANCE = 1e-6
 _NEIGHBOURS = 8
+#: flat triangles along a facet's edge; the sagitta of a wall's curvature between them is microns
+_DIVISIONS = 4
+
+
+#: walls are in contact where they push at each other with more than this part of the air's pressure
+IN_CONTACT = 0.1
+
+
+@dataclass(frozen=True)
+class WallContact:
+    """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm) met there.
+
+    gamma: stiffness of the medium that transmits it, over the body's.
+    """
+
+    force: float
+    area: float
+    nearest: float
+    farthest: float
+    gamma: float
 
 
 class WallDistances:
-    """Signed distances between facing chamber walls; evaluated on rank 0 from gathered wall nodes.
-
-    Negative = overlap: a point of one wall lies behind the other wall's surface.
-    """
+    """Smallest distance in each gap of a manipulator; evaluated on rank 0 from gathered wall nodes."""
 
     def __init__(self, problem, manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
@@ -60,10 +84,72 @@ class WallDistances:
         return out
 
 
+class CellWalls:
+    """The walls of a cell's gaps, put together from the pieces that its cuts leave.
+
+    gaps: a pair of walls for each side of the body, the second facing the first across the gap; each is (facets (n, 6) of
+    nodes, shift (n,) in mm, whole pitches that bring a piece to its wall).
+    """
+
+    def __init__(self, problem):
+        self.problem, s = problem, problem.segment
+        facets = surface.facet_nodes(problem, cad.OUTER)
+        corners = problem.nodes[facets[:, :3]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        slope = normal[:, 0] / np.linalg.norm(normal, axis=1)
+        self.gaps = []
+        for side in s.sides:
+            above = (side * corners[:, :, 2]).min(axis=1) > s.core_top - _TOLERANCE
+            along = (corners[:, :, 0] - side * s.cot * corners[:, :, 1]).mean(axis=1)
+            first, second = (np.flatnonzero(above & (sign * slope > 0.1)) for sign in (1, -1))
+            plane = along[first[0]]
+            places = ((first, plane), (second, plane + s.gap / s.sin))
+            self.gaps.append([(facets[c], s.pitch * np.round((x - along[c]) / s.pitch)) for c, x in places])
+
+    def positions(self, wall, array=None):
+        """(n, 6, 3) deformed positions of a wall's nodes, in the section frame at X1 = 0."""
+        facets, shift = wall
+        e, k = np.split(self.problem.strains.value, 2)
+        u, X = self.problem.displacement(array), self.problem.nodes[facets]
+        screw = se3.exp_pose(np.concatenate([k, e]) * (X[..., :1] + shift[:, None, None]))
+        local = X * [0, 1, 1] + u[facets]
+        return np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
+
+    def distance(self):
+        """Smallest signed distance in mm; inf without chambers."""
+        pairs = [[self.positions(wall) for wall in gap] for gap in self.gaps]
+        return min((min(wall_distance(a, b), wall_distance(b, a)) for a, b in pairs), default=np.inf)
+
+    def contact(self, pressure):
+        """WallContact of the gap with the largest force, `pressure` (MPa) being that of the air."""
+        return max((self._contact(gap, pressure) for gap in self.gaps), key=lambda c: c.force)
+
+    def _contact(self, gap, pressure):
+        (facets, shift), other = gap
+        e, k = np.split(self.problem.strains.value, 2)
+        s = self.problem.nodes[facets][..., :1] + shift[:, None, None]
+        rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
+        forces = np.einsum("...ij,...j->...i", rotation, self.problem.contact_forces()[facets]).reshape(-1, 3)
+        # a node of a cut lies on both sides of it, with a share of the force on each
+        _, first, inverse = np.unique(np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True)
+        forces, x = forces[first], self.positions(gap[0]).reshape(-1, 3)[first]
+        shares = np.outer(surface.reference_areas(self.problem, facets), [0, 0, 0, 1 / 3, 1 / 3, 1 / 3])
+        areas = np.bincount(inverse.ravel(), shares.ravel())
+        total = np.linalg.norm(forces.sum(axis=0))
+        touching = (areas > 0) & (forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas)
+        distances = distances_from(self.positions(other), x)[touching]
+        nearest, farthest = (distances.min(), distances.max()) if len(distances) else (np.nan, np.nan)
+        return WallContact(float(total), float(areas[touching].sum()), float(nearest), float(farthest), self.problem.medium.gamma)
+
+
 def wall_distance(points, wall):
     """Smallest signed distance (mm) of the nodes of quadratic facets `points` (n, 6, 3) from the wall (m, 6, 3)."""
-    triangles = wall.reshape(-1, 3)[surface.split(np.arange(6 * len(wall)).reshape(-1, 6))]
-    points = np.unique(points.reshape(-1, 3), axis=0)
+    return float(distances_from(wall, np.unique(points.reshape(-1, 3), axis=0)).min())
+
+
+def distances_from(wall, points):
+    """(n,) signed distances (mm) of points (n, 3) from a wall of quadratic facets (m, 6, 3)."""
+    triangles = surface.subdivided(wall, _DIVISIONS)
     count = min(_NEIGHBOURS, len(triangles))
     near = cKDTree(triangles.mean(axis=1)).query(points, k=count)[1].reshape(len(points), count)
     candidates = triangles[near]
@@ -77,7 +163,7 @@ def wall_distance(points, wall):
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     # behind the wall only when the wall's interior is what is closest; past its rim the sign has no meaning
     behind = np.einsum("ni,ni->n", offset, normal) < -0.9 * distance
-    return float(np.where(behind, -distance, distance).min())
+    return np.where(behind, -distance, distance)
 
 
 def closest_point(point, triangle):

@@ -306,6 +306,8 @@ CELLS = {
     "unit": ("pressure_kPa = 10", "pressure_MPa = 0.01", "write 'pressure_kPa'"),
     "no pressure": ("pressure_kPa = 10\n", "", "'pressure_kPa' is missing"),
     "control": ("levels = 2", "control = 'force'", "write 'pressure' or 'volume'"),
+    "contact": ("levels = 2", "contact = 'glue'", "write 'auto', 'third-medium' or 'none'"),
+    "contact and volume": ("levels = 2", "control = 'volume'\ncontact = 'third-medium'", "goes with control = 'pressure'"),
     "levels": ("levels = 2", "levels = 2.5", "'levels' must be a whole number"),
     "mesh": ("mesh_size_mm = 3", "mesh_size_mm = 0", "mesh_size_mm = 0 must lie in 0.1..20"),
     "held": ("angle_deg = 60", "angle_deg = 60\n[held]\nk1 = 0.1", "k1_per_mm"),

@@ -27,6 +27,7 @@ class Solid:
     width: float
     material: NeoHookean = NeoHookean(1.0)
     layer_material: None = None
+    sides: tuple = ()
 
 
 def held_at(problem, held, strains):
