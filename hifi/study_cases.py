@@ -31,7 +31,9 @@ def solve_cell_case(inputs, directory):
             {
                 "pressure_kPa": state.pressure * KPA,
                 **_strains(state.strains.e, state.strains.k),
-                **_body(state, breaks_at),
+                "smallest_wall_distance_mm": state.wall_distance,
+                "contact_force_N": state.contact.force if state.contact else 0.0,
+                **_body(state, breaks_at, state.wall_distance if state.contact is None else np.inf),
                 **{name: getattr(state, name) for name in EFFORT},
             }
         )
@@ -76,7 +78,7 @@ def _strains(e, k):
     return dict(zip(STRAINS, [*e, *k, np.linalg.norm(k), k @ e]))
 
 
-def _body(state, breaks_at, nearest=np.inf):
+def _body(state, breaks_at, nearest):
     """What cells and manipulators tell alike, and a word on what makes the row doubtful."""
     warnings = {
         "walls overlap": nearest < 0,
