@@ -5,10 +5,13 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from base.errors import ConvergenceError
+from base.materials import NeoHookean
+from hifi.body import BodySystem
 from hifi.control import ArcLength, LoadControl, VolumeControl
 from hifi.loads import EndLoad, Pressure
 from hifi.path import EquilibriumPath, PathState, limit_point
-from hifi.problem import Support
+from hifi.problem import MixedProblem, Support
+from hifi.rod_coordinates import RodCoordinates
 from hifi.stepping import StepSize, run_steps
 from hifi.surface import FaceQuadrature
 from tests.verification import bodies
@@ -52,6 +55,21 @@ def test_arc_length_follows_the_sphere_through_its_limit_point(sphere):
     assert radii[-1] > 2.1 and (np.diff(radii) > 0).all()
     assert pressures == pytest.approx(sphere_pressure(radii), rel=3e-3, abs=3e-4)  # a coarse mesh
     named(path)
+
+
+def test_several_pressures_rise_together(shared_directory):
+    """One path, two pressures at a ratio: only their difference deforms an incompressible sphere."""
+    mesh = bodies.round_body(shared_directory, "sphere", 0.25)
+    inner, outer = Pressure((bodies.INNER,)), Pressure((bodies.OUTER,))
+    problem = MixedProblem(*mesh, NeoHookean(1.0), SYMMETRY, [inner, outer])
+
+    def apply(load):
+        inner.value.value, outer.value.value = 1.5 * load, 0.5 * load
+
+    system = BodySystem(problem, RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm), apply)
+    run_steps(EquilibriumPath(system, LoadControl()), 0.3, StepSize(0.1, 1e-3))
+    assert (6 * system.volume() / np.pi) ** (1 / 3) == pytest.approx(1.10556673, rel=1e-3)
+    system.destroy()
 
 
 def test_volume_control_names_the_limit_point(sphere):
