@@ -9,6 +9,7 @@ plain update with one rigid motion taken out; the same code serves spheres and m
 
 import numpy as np
 from mpi4py import MPI
+from scipy.sparse import csr_matrix
 
 from base import se3
 from base.frames import FitMoments
@@ -28,15 +29,15 @@ class RodCoordinates:
         self.left = np.clip(position.astype(int), 0, max(intervals - 1, 0))
         self.right = np.minimum(self.left + 1, intervals)
         self.fraction = (position - self.left)[:, None] if intervals else np.zeros((len(x), 1))
+        weights = np.hstack([1 - self.fraction, self.fraction])[:owned]
+        columns = np.column_stack([self.left, self.right])[:owned]
+        rows = np.repeat(np.arange(len(weights)), 2)
+        #: (stations, owned) hat functions
+        self._hats = csr_matrix((weights.ravel(), (columns.ravel(), rows)), shape=(self.stations, len(weights)))
 
     def _sum_over_stations(self, rows):
         """(stations, k) hat-weighted sums of the owned nodes' rows (n, k), over all ranks."""
-        total = np.zeros((self.stations, rows.shape[1]))
-        f = self.fraction[: self.owned]
-        for i, w in ((self.left, 1 - f), (self.right, f)):
-            for column in range(rows.shape[1]):
-                total[:, column] += np.bincount(i[: self.owned], (w * rows)[:, column], minlength=self.stations)
-        return self.comm.allreduce(total, op=MPI.SUM)
+        return self.comm.allreduce(self._hats @ rows, op=MPI.SUM)
 
     def _interpolate(self, start, between):
         """Poses (n, 4, 4) at the nodes: `start` (stations, 4, 4) continued by fractions of `between` (stations, 6)."""
