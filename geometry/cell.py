@@ -9,8 +9,8 @@ from base.errors import InputError
 from base.files import atomic_path
 from geometry import cad
 
-#: physical tag of the air's volume
-AIR = 200
+#: physical tags of the air's volume and of the gaps'
+AIR, GAP = 200, 400
 
 
 def mesh_cell(segment, mesh_size, path, cut=0.0):
