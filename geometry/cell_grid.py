@@ -22,7 +22,7 @@ from geometry.cell import AIR, GAP
 from geometry.parameters import ONE_SIDED
 
 #: thickness of the layers at a sharp edge, as a part of the mesh size, and how much thicker each next one may be
-EDGE, GROWTH = 0.1, 3.0
+EDGE, GROWTH = 0.13, 6.0
 _EMPTY = 0
 
 

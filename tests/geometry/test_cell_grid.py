@@ -10,7 +10,7 @@ from base.errors import InputError
 from base.materials import NeoHookean
 from geometry import cad
 from geometry.cell import AIR, GAP, mesh_cell
-from geometry.cell_grid import mesh_cell_grid
+from geometry.cell_grid import cell_grid, mesh_cell_grid
 from tests.cases import CASES
 
 LAYER = dict(layer_thickness=0.5, layer_material=NeoHookean(2.0))
@@ -93,12 +93,18 @@ def test_the_half_turn_maps_the_mesh_to_itself(tmp_path):
         assert sorted(map(tuple, (middles + 0.0).round(8) + 0.0)) == sorted(map(tuple, (turned + 0.0).round(8) + 0.0))
 
 
-def test_layers_get_thinner_with_the_edge_and_chambers_that_slant_both_ways_are_refused(tmp_path):
-    points = []
-    for edge in (0.2, 0.1):
-        mesh_cell_grid(segment(90.0), 2.0, tmp_path / "grid.msh", edge=edge)
-        x = np.unique(read(tmp_path / "grid.msh")[0][:, 0].round(9))
-        points.append(np.diff(x).min())
-    assert points[1] < 0.75 * points[0]
+@pytest.mark.parametrize(("coarse", "fine", "growth"), [(1.5, 0.2, 6.0), (0.5, 0.05, 2.0)])
+def test_layers_at_sharp_edges_are_thin_and_even_in_number_across_the_turn(coarse, fine, growth):
+    built = segment(60.0)
+    planes = cell_grid(built, coarse, fine, growth).planes
+    half = built.cavity_thickness / 2 / built.sin
+    for p, sharp in zip(planes, (half, built.cavity_width / 2, built.cavity_top)):
+        steps, at = np.diff(p), int(np.abs(p - sharp).argmin())
+        assert p[at] == pytest.approx(sharp, abs=1e-12)
+        assert steps[[at - 1, at]].max() <= fine + 1e-12 and steps.max() <= coarse + 1e-12
+    assert len(planes[0]) % 2 == len(planes[1]) % 2 == 1
+
+
+def test_chambers_that_slant_both_ways_are_refused(tmp_path):
     with pytest.raises(InputError, match="only a one-sided segment"):
         mesh_cell_grid(CASES["twist_w12"](angle=60.0, chambers=1), 2.0, tmp_path / "grid.msh")
