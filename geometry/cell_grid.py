@@ -2,8 +2,8 @@
 
 In the oblique coordinates (xi, y, z), xi = x - y cot(angle), such a body is a union of boxes, so is its air, and the faces
 of all of them lie on a few planes of constant xi, y or z. Between these the grid is graded towards those on which an edge
-of the body is re-entrant (cavity, channel, floor of the gap): the error comes from there, and falls with the thickness of
-the layers at a cost of one more layer, where tetrahedra of one size along and across an edge cost its whole length anew.
+of the body is re-entrant (cavity, channel, floor of the gap), where stresses are singular. Every layer runs through the
+whole cell: at equal numbers of unknowns it is no more accurate than geometry.cell's mesh graded towards the edges.
 Each hexahedron is cut into six tetrahedra (Kuhn), mirrored by the parity of its index, so that neighbours fit. The cuts
 are the slanted planes through the middle of the gaps. With even numbers of intervals along xi and y the mesh maps to
 itself under a half turn about z, and so do the solutions on it.

@@ -108,3 +108,14 @@ def test_layers_at_sharp_edges_are_thin_and_even_in_number_across_the_turn(coars
 def test_chambers_that_slant_both_ways_are_refused(tmp_path):
     with pytest.raises(InputError, match="only a one-sided segment"):
         mesh_cell_grid(CASES["twist_w12"](angle=60.0, chambers=1), 2.0, tmp_path / "grid.msh")
+
+
+@pytest.mark.parametrize("built", [segment(60.0), segment(60.0, "twist_w12")], ids=["one-sided", "twisting"])
+def test_the_cad_s_mesh_gets_finer_at_the_edges_alone(built, tmp_path):
+    sizes = []
+    for edge_size in (None, 0.6):
+        facts = mesh_cell(built, 2.0, tmp_path / "cell.msh", edge_size=edge_size)
+        points, groups = read(tmp_path / "cell.msh")
+        sizes.append(facts["cells"])
+        assert volume(points, groups[3, cad.BODY]) == pytest.approx(facts["body_mm3"], rel=1e-9)
+    assert 1.5 * sizes[0] < sizes[1] < (2.0 / 0.6) ** 3 * sizes[0]
