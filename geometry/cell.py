@@ -16,11 +16,12 @@ from geometry import cad
 AIR, GAP = 200, 400
 
 
-def mesh_cell(segment, mesh_size, path, cut=0.0, gaps=False):
+def mesh_cell(segment, mesh_size, path, cut=0.0, gaps=False, edge_size=None):
     """Write the cell's mesh to `path`; returns {"body_mm3", "air_mm3", "cells"}.
 
     x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). `gaps`: mesh the space between the chambers
-    too. InputError when the faces on the two cuts do not match or the mesh fails.
+    too. edge_size (mm): size at the body's edges, where stresses are singular; it grows from there to mesh_size; None = one size
+    everywhere. InputError when the faces on the two cuts do not match or the mesh fails.
     """
     half = segment.pitch / 2
     with cad.session("cell"):
@@ -28,6 +29,8 @@ def mesh_cell(segment, mesh_size, path, cut=0.0, gaps=False):
         gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
         gmsh.option.setNumber("Mesh.RandomSeed", 1)
+        if edge_size is not None:
+            _grade(half, edge_size, mesh_size)
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises plain Exception with its own text
@@ -93,6 +96,27 @@ def _gap_solids(segment, half, centres):
 def _on_cut(face, half):
     x0, _, _, x1, _, _ = gmsh.model.getBoundingBox(2, face)
     return x1 - x0 < 1e-5 and abs(abs(x0) - half) < 1e-5
+
+
+def _grade(half, near, far, slope=0.7):
+    """Sizes from `near` at every edge but those that only the cuts make, growing by `slope` per mm of distance up to `far`."""
+    starts, along = [], []
+    for _, curve in gmsh.model.getEntities(1):
+        points = gmsh.model.getBoundary([(1, curve)], oriented=False)
+        a, b = (np.array(gmsh.model.getValue(0, point, [])) for _, point in points)
+        if abs(abs(a[0]) - half) > 1e-6 or abs(b[0] - a[0]) > 1e-6:
+            starts.append(a)
+            along.append(b - a)
+    starts, along = np.array(starts), np.array(along)
+    squares = (along**2).sum(axis=1)
+
+    def size(*arguments):  # (dim, tag, x, y, z), and in newer versions the size so far
+        offset = np.array(arguments[2:5]) - starts
+        nearest = offset - np.clip((offset * along).sum(axis=1) / squares, 0, 1)[:, None] * along
+        return float(min(far, near + slope * np.sqrt((nearest**2).sum(axis=1).min())))
+
+    # gmsh counts the arguments of what it is given: a function that takes any number
+    gmsh.model.mesh.setSizeCallback(lambda *arguments: size(*arguments))
 
 
 def _boundary(volumes):

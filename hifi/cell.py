@@ -15,7 +15,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import csgraph
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from geometry import cad
@@ -100,6 +100,7 @@ class CellProblem:
         self._volume = compat.compile_form(J * air)
         self._matrix = fem.petsc.create_matrix(self._tangent)
         self._vector = fem.petsc.create_vector(self._residual)
+        self._bordered = None
 
     def _reduce(self, rollers):
         """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p has -1."""
@@ -182,13 +183,10 @@ class CellProblem:
         self._matrix.zeroEntries()
         fem.petsc.assemble_matrix(self._matrix, self._tangent)
         self._matrix.assemble()
-        indptr, indices, data = self._matrix.getValuesCSR()
-        rows = self.reduced[np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))]
-        columns = self.reduced[indices]
-        keep = (rows >= 0) & (columns >= 0)
-        n = self.unknowns
-        K = sp.coo_matrix((data[keep], (rows[keep], columns[keep])), shape=(n, n)).tocsr()
-        matrix = sp.bmat([[K, self.gauge], [self.gauge.T, sp.csr_matrix(np.zeros((6, 6)))]], format="csr")
+        _, _, data = self._matrix.getValuesCSR()
+        if self._bordered is None:
+            self._bordered = _BorderedPattern(self._matrix, self.reduced, self.gauge)
+        matrix, n = self._bordered.filled(data), self.unknowns
         mixed, curvature = np.empty((n, 6)), np.empty((6, 6))
         for i in range(6):
             self._left.value[:] = np.eye(6)[i]
@@ -210,6 +208,27 @@ class CellProblem:
         return float(fem.assemble_scalar(self._volume))
 
 
+class _BorderedPattern:
+    """Where the entries of a matrix of the mixed space go in that of the unknowns, bordered by the gauge."""
+
+    def __init__(self, matrix, reduced, gauge):
+        indptr, indices, _ = matrix.getValuesCSR()
+        rows, columns = reduced[np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))], reduced[indices]
+        self._keep = np.flatnonzero((rows >= 0) & (columns >= 0))
+        border, size = gauge.tocoo(), sum(gauge.shape)
+        i, j, corner = border.row.astype(np.int64), border.col + gauge.shape[0], np.arange(gauge.shape[0], size)
+        self._border = np.concatenate([border.data, border.data, np.zeros(len(corner))])
+        key = np.concatenate([rows[self._keep], i, j, corner]) * size + np.concatenate([columns[self._keep], j, i, corner])
+        key, self._place = np.unique(key, return_inverse=True)
+        self._indices, self._indptr = key % size, np.searchsorted(key, size * np.arange(size + 1))
+        self._shape = size, size
+
+    def filled(self, data):
+        """CSR matrix of the values `data` of the mixed space's matrix."""
+        values = np.bincount(self._place, np.concatenate([data[self._keep], self._border]), len(self._indices))
+        return sp.csr_matrix((values, self._indices, self._indptr), shape=self._shape)
+
+
 def _same_modulo(points, pitch, tolerance=1e-5):
     """(n,) index of the first of those points (n, 3) that coincide when X1 is taken modulo the pitch; tolerance in mm."""
     wrapped = points.copy()
@@ -219,7 +238,7 @@ def _same_modulo(points, pitch, tolerance=1e-5):
     wrapped[:, 1:] -= wrapped[:, 1:].min(axis=0)  # the tree's box starts at zero
     pairs = cKDTree(wrapped, boxsize=[pitch, *(2 * far[1:])]).query_pairs(tolerance, output_type="ndarray")
     graph = sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, labels = csgraph.connected_components(graph, directed=False)
+    _, labels = connected_components(graph, directed=False)
     first = np.full(labels.max() + 1, len(points))
     np.minimum.at(first, labels, np.arange(len(points)))
     return first[labels]

@@ -150,7 +150,7 @@ class CellSystem:
             self._matrix.assemble()
         self._solver.factorise()
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
-        self._influence = np.column_stack([self._solver.solve(column) for column in self._mixed.T])
+        self._influence = self._solver.solve_many(self._mixed)
         self._condensed = self._curvature - self._mixed.T @ self._influence
 
     def solve(self, right):

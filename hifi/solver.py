@@ -57,6 +57,16 @@ class DirectSolver:
         self.ksp.solve(self._right, self._solution)
         return self._solution.array.copy()
 
+    def solve_many(self, right):
+        """K^-1 right, (rows, columns) arrays on one rank: all columns in one pass through the factors."""
+        b = PETSc.Mat().createDense(right.shape, array=right.copy(order="F"), comm=PETSc.COMM_SELF)
+        x = b.duplicate()
+        self.ksp.getPC().getFactorMatrix().matSolve(b, x)
+        solution = x.getDenseArray().copy()
+        b.destroy()
+        x.destroy()
+        return solution
+
     def destroy(self):
         self.ksp.destroy()
         self._solution.destroy()
