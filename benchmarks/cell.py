@@ -7,24 +7,26 @@ from pathlib import Path
 import numpy as np
 
 PRESSURES = (0.02, 0.05)
-SIZES = (2.0, 1.5, 1.0, 0.8)
+#: mesh sizes in mm of the study: uniform, and graded ones in a constant ratio for the extrapolation
+UNIFORM = (2.0, 1.5, 1.0, 0.7)
+GRADED = (1.5, 1.225, 1.0)
 
 
-def case(mesh_size):
+def case(mesh_size, levels=10, graded=False):
     from base.materials import NeoHookean
     from hifi.cell_run import CellCase
     from tests.cases import CASES
 
     segment = CASES["one_sided_w10"](angle=60.0, chambers=1, material=NeoHookean(0.2068))
-    return CellCase(segment, 0.05, mesh_size, 10)
+    return CellCase(segment, 0.05, mesh_size, levels, contact="none", graded=graded)
 
 
-def sweep(mesh_size, folder):
-    """(CPU seconds, cells, states) of 0-50 kPa in 10 levels, the 6x6 stiffness at each."""
+def sweep(what, folder):
+    """(CPU seconds, cells, states) of 0-50 kPa, the 6x6 stiffness at each level."""
     from hifi.cell_run import solve_cell
 
     states, started = [], time.process_time()
-    _, facts = solve_cell(case(mesh_size), Path(folder) / f"{mesh_size}.msh", states.append)
+    _, facts = solve_cell(what, Path(folder) / "cell.msh", states.append)
     return time.process_time() - started, facts["cells"], states
 
 
@@ -33,14 +35,14 @@ def stiffness_difference(folder, mesh_size=2.0):
     from hifi.cell_run import CellCase, solve_cell
 
     segment, path = case(mesh_size).segment, Path(folder) / "fd.msh"
-    free, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1), path)
+    free, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1, contact="none"), path)
     q = np.concatenate([free.strains.e, free.strains.k])
     worst = 0.0
     for i, step in enumerate([2e-4] * 3 + [2e-5] * 3):
         forces = []
         for sign in (1, -1):
             wanted = q + sign * step * np.eye(6)[i]
-            held, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1, dict(enumerate(wanted))), path)
+            held, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1, dict(enumerate(wanted)), contact="none"), path)
             forces.append(np.concatenate([held.force, held.moment]))
         scale = np.sqrt(np.diag(free.stiffness))
         difference = (forces[0] - forces[1]) / (2 * step) - free.stiffness[:, i]
@@ -48,34 +50,80 @@ def stiffness_difference(folder, mesh_size=2.0):
     return worst
 
 
+def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
+    """Largest relative change when the cut moves (6x6 stiffness) and when the gauge does (what belongs to no section frame)."""
+    from geometry import cad
+    from geometry.cell import mesh_cell
+    from hifi.cell import CellProblem
+    from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
+    from hifi.control import LoadControl
+    from hifi.newton import NewtonOptions
+    from hifi.path import EquilibriumPath
+    from hifi.stepping import StepSize, run_steps
+    from tests.recut import recut
+
+    segment, path, other = case(mesh_size).segment, Path(folder) / "cell.msh", Path(folder) / "recut.msh"
+    mesh_cell(segment, mesh_size, path)
+    recut(path, other, segment.pitch, 0.9)
+
+    def state(mesh, *gauge):
+        system = CellSystem(CellProblem(segment, mesh, *gauge))
+        path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+        run_steps(path, pressure, StepSize(0.005, 1e-4))
+        found = system.measure()
+        system.destroy()
+        return found
+
+    here, cut, walls = state(path), state(other), state(path, (cad.CAVITY,))
+    scale = np.sqrt(np.diag(here.stiffness))
+    moved = np.abs((cut.stiffness - here.stiffness) / np.outer(scale, scale)).max()
+    frames = np.abs(walls.screw_compliance / here.screw_compliance - 1).max()
+    single = np.abs((walls.stiffness - here.stiffness) / np.outer(scale, scale)).max()
+    return float(max(moved, frames)), {"cut": float(moved), "screw_compliance": float(frames), "single_entries": float(single)}
+
+
 def unit_cell():
     """The part `cell`: ({key: value}, details)."""
     from hifi.cell_run import CellCase
 
+    default = CellCase.mesh_size
     with tempfile.TemporaryDirectory() as folder:
-        sweep(2.5, folder)  # compiles the forms
-        runs = {size: sweep(size, folder) for size in SIZES}
-        strains = {}
-        for size, (_, _, states) in runs.items():
-            at = {round(s.pressure, 6): s for s in states}
-            strains[size] = np.array([[*at[p].strains.e, *(at[p].strains.k * case(size).segment.pitch)] for p in PRESSURES])
-        finest, finer = SIZES[-1], SIZES[-2]
-        # Richardson with the order that singular corners leave, one in the mesh size; stated, not fitted
-        extrapolated = strains[finest] + (strains[finest] - strains[finer]) * finest / (finer - finest)
-        norm = np.linalg.norm(extrapolated - np.eye(6)[0], axis=1)
-        error = {s: float((np.linalg.norm(q - extrapolated, axis=1) / norm).max()) for s, q in strains.items()}
-        stiffness = {s: runs[s][2][-1].stiffness for s in (finest, finer)}
-        eigenvalues = np.linalg.eigvals(np.linalg.solve(stiffness[finest], stiffness[finer])).real
-        default = CellCase.mesh_size
-        figures = {
-            "cell_sweep_h2_cpu_seconds": runs[2.0][0],
-            "cell_sweep_default_cpu_seconds": runs[default][0],
-            "cell_mesh_error_rel": error[default],
-            "cell_stiffness_fd_rel": stiffness_difference(folder),
-            "cell_stiffness_refinement_rel": float(np.abs(eigenvalues - 1).max()),
+        sweep(case(2.5), folder)  # compiles the forms
+        runs = {(size, False): sweep(case(size), folder) for size in UNIFORM}
+        runs |= {(size, True): sweep(case(size, 5, True), folder) for size in GRADED}
+        difference, gauge = stiffness_difference(folder), gauge_difference(folder)
+    strains = {}
+    for key, (_, _, states) in runs.items():
+        at = {round(s.pressure, 6): s for s in states}
+        strains[key] = np.array([[*at[p].strains.e, *(at[p].strains.k * case(1.0).segment.pitch)] for p in PRESSURES])
+    coarse, middle, fine = (strains[size, True] for size in GRADED)
+    norm = np.linalg.norm(fine - np.eye(6)[0], axis=1)
+    # Richardson with the ratio that the three graded meshes show, in the norm, at each pressure
+    ratio = np.linalg.norm(middle - coarse, axis=1) / np.linalg.norm(fine - middle, axis=1)
+    extrapolated = fine + (fine - middle) / (ratio - 1)[:, None]
+    error = {key: float((np.linalg.norm(q - extrapolated, axis=1) / norm).max()) for key, q in strains.items()}
+    stiffness = [runs[size, True][2][-1].stiffness for size in GRADED[1:]]
+    eigenvalues = np.linalg.eigvals(np.linalg.solve(stiffness[1], stiffness[0])).real
+    figures = {
+        "cell_sweep_h2_cpu_seconds": runs[2.0, False][0],
+        "cell_sweep_default_cpu_seconds": runs[default, False][0],
+        "cell_mesh_error_rel": error[default, False],
+        "cell_mesh_error_graded_rel": error[GRADED[-1], True],
+        "cell_stiffness_fd_rel": difference,
+        "cell_stiffness_gauge_rel": gauge[0],
+        "cell_stiffness_refinement_rel": float(np.abs(eigenvalues - 1).max()),
+    }
+    study = [
+        {
+            "mesh_size_mm": size,
+            "graded": graded,
+            "levels": len(states) - 1,
+            "cells": cells,
+            "cpu_seconds": seconds,
+            "strain_error_rel": error[size, graded],
+            "strains_e_k_pitch": strains[size, graded].tolist(),
         }
-        study = {
-            str(s): {"cells": runs[s][1], "cpu_seconds": runs[s][0], "strain_error_rel": error[s], "strains_e_k_pitch": strains[s].tolist()}
-            for s in SIZES
-        }
-    return figures, {"mesh_study_20_and_50_kPa": study, "extrapolated": extrapolated.tolist()}
+        for (size, graded), (seconds, cells, states) in runs.items()
+    ]
+    order = (np.log(ratio) / np.log(GRADED[0] / GRADED[1])).tolist()
+    return figures, {"mesh_study": study, "extrapolated": extrapolated.tolist(), "observed_order": order, "gauge": gauge[1]}

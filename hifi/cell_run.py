@@ -26,10 +26,12 @@ from hifi.stepping import StepSize, lagrange_coefficients, run_steps
 STRAINS = ("e1", "e2", "e3", "k1_per_mm", "k2_per_mm", "k3_per_mm")
 CONTROLS = ("pressure", "volume")
 KEYS = (
-    *("pressure_kPa", "mesh_size_mm", "levels", "control", "volume_factor", "contact"),
+    *("pressure_kPa", "mesh_size_mm", "levels", "control", "volume_factor", "contact", "graded"),
     *("material", "layer_material", "segment", "held"),
 )
 CONTACTS = ("auto", "none", "third-medium")
+#: size at the body's edges of a graded mesh, over its mesh_size
+EDGE = 0.2
 #: iterations that a lagged tangent may still need in contact, where tangents age fast
 CONTACT_PATIENCE = 10.0
 
@@ -41,7 +43,7 @@ class CellCase:
     held: {index of (e, k): prescribed value, 1/mm for k}; reached from the free state at the top pressure. control:
     'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor` times the volume at rest.
     contact: 'third-medium', 'none', or 'auto': none until walls are seen to touch, and the third medium from there on (none
-    at all with control 'volume').
+    at all with control 'volume'). graded: elements shrink to mesh_size * EDGE at the body's edges, where stresses are singular.
     """
 
     segment: Segment
@@ -53,6 +55,7 @@ class CellCase:
     volume_factor: float = 2.0
     contact: str = "auto"
     medium: ThirdMedium = ThirdMedium()
+    graded: bool = False
 
 
 def read_cell(path):
@@ -74,6 +77,9 @@ def cell_from_tables(data, where):
         raise InputError(f"{where}: contact = {contact!r} is not known: write 'auto', 'third-medium' or 'none'")
     if contact == "third-medium" and control == "volume":
         raise InputError(f"{where}: contact = 'third-medium' goes with control = 'pressure'")
+    graded = data.get("graded", CellCase.graded)
+    if not isinstance(graded, bool):
+        raise InputError(f"{where}: graded = {graded!r} must be true or false")
     if control == "pressure" and "pressure_kPa" not in data:
         raise InputError(f"{where}: key 'pressure_kPa' is missing")
 
@@ -98,7 +104,7 @@ def cell_from_tables(data, where):
         material_from_table(data[key], f"{where} [{key}]") if key in data else None for key in ("material", "layer_material")
     )
     segment = segment_from_table(row, f"{where} [segment]", material, layer_material)
-    return CellCase(segment, pressure, float(mesh_size), levels, held, control, float(volume_factor), contact)
+    return CellCase(segment, pressure, float(mesh_size), levels, held, control, float(volume_factor), contact, graded=graded)
 
 
 def cell_tables(case):
@@ -111,6 +117,7 @@ def cell_tables(case):
         "control": case.control,
         "volume_factor": case.volume_factor,
         "contact": case.contact,
+        "graded": case.graded,
         "material": material_to_table(segment.material),
         "segment": to_table(segment),
         "held": {STRAINS[i]: value for i, value in case.held.items()},
@@ -131,7 +138,8 @@ def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lamb
     first touch, once, before the first state beyond it. ConvergenceError when the path ends short; what was recorded before
     has been seen by `on_state`.
     """
-    facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=case.contact != "none")
+    edge_size = case.mesh_size * EDGE if case.graded else None
+    facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=case.contact != "none", edge_size=edge_size)
     seen = []
 
     def see(state):
@@ -307,7 +315,7 @@ def run_cell(path, directory, say=print):
         contact=case.contact,
         first_touch_kPa=touched[0] if touched else None,
         walls_overlap=any(row[HEADER.index("walls_overlap")] for row in rows),
-        mesh={"mesh_size_mm": case.mesh_size, **facts},
+        mesh={"mesh_size_mm": case.mesh_size, "graded": case.graded, **facts},
         wall_seconds=time.perf_counter() - started,
     )
     if not facts:
