@@ -44,18 +44,37 @@ def log_rotation(rotation):
     return Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-2] + (3,))
 
 
+def hat_pose(twist):
+    """Matrices (..., 4, 4) of twists (..., 6), the exponents of their poses."""
+    twist = np.asarray(twist, float)
+    out = np.zeros(twist.shape[:-1] + (4, 4))
+    out[..., :3, :3], out[..., :3, 3] = hat(twist[..., :3]), twist[..., 3:]
+    return out
+
+
+def screw_basis(twist):
+    """(..., 4, 4, 4): the powers 0 to 3 of X = hat_pose(twist), which exp(s X) is a combination of, since X^4 = -|w|^2 X^2."""
+    out = np.empty(np.shape(twist)[:-1] + (4, 4, 4))
+    out[..., 0, :, :], out[..., 1, :, :] = np.eye(4), hat_pose(twist)
+    out[..., 2, :, :] = out[..., 1, :, :] @ out[..., 1, :, :]
+    out[..., 3, :, :] = out[..., 2, :, :] @ out[..., 1, :, :]
+    return out
+
+
+def screw_coefficients(rate, s=1.0):
+    """(..., 4) coefficients of `screw_basis` in exp(s X), for |w| = rate: 1, s, s^2 (1 - cos t)/t^2, s^3 (t - sin t)/t^3, t = s rate."""
+    _, b, c = _coefficients(s * rate)
+    b, c = b[..., 0, 0], c[..., 0, 0]
+    out = np.empty(b.shape + (4,))
+    out[..., 0], out[..., 1], out[..., 2], out[..., 3] = 1.0, s, s * s * b, s * s * s * c
+    return out
+
+
 def exp_pose(twist):
     """Poses (..., 4, 4) of twists (..., 6) = (rotation vector, translation part)."""
     twist = np.asarray(twist, float)
-    w, v = twist[..., :3], twist[..., 3:]
-    W = hat(w)
-    a, b, c = _coefficients(np.linalg.norm(w, axis=-1))
-    out = np.zeros(twist.shape[:-1] + (4, 4))
-    WW = W @ W
-    out[..., :3, :3] = np.eye(3) + a * W + b * WW
-    out[..., :3, 3] = ((np.eye(3) + b * W + c * WW) @ v[..., None])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
+    coefficients = screw_coefficients(np.linalg.norm(twist[..., :3], axis=-1))
+    return np.einsum("...a,...aij->...ij", coefficients, screw_basis(twist))
 
 
 def log_pose(pose):

@@ -14,7 +14,7 @@ from base.strains import RodStrains
 from design.curves import arc_lengths, evenly, nearest_points
 from design.lookup import active_length
 from reduced.clearance import gap_left
-from reduced.rod import centreline
+from reduced.centreline import centreline
 
 PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)

@@ -2,6 +2,6 @@
 
 from reduced.body import body_surface
 from reduced.model import AnalyticModel, SegmentLaw, predict
-from reduced.rod import Centreline, centreline
+from reduced.centreline import Centreline, centreline
 
 __all__ = ["AnalyticModel", "Centreline", "SegmentLaw", "body_surface", "centreline", "predict"]

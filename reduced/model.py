@@ -9,7 +9,7 @@ from base.errors import InputError
 from base.strains import RodStrains
 from geometry.parameters import TWISTING
 from reduced.helical import HelicalCell
-from reduced.rod import centreline
+from reduced.centreline import centreline
 from reduced.section import equivalent_radii
 from reduced.twisting import TwistingTube
 

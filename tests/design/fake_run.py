@@ -10,7 +10,7 @@ from base.strains import RodStrains
 from geometry.designfile import Design, body_tables, write_design
 from geometry.parameters import Manipulator, Segment
 from reduced.model import AnalyticModel, predict
-from reduced.rod import centreline
+from reduced.centreline import centreline
 
 FACTOR = 0.8
 POSE = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, -3.0], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])

@@ -79,13 +79,20 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
         raise InputError(f"strains: give e and k of shape ({lengths.size}, 3), one row for every piece")
     if not spacing > 0:
         raise InputError(f"spacing = {spacing:g} mm must be larger than 0")
-    twist = strains.twist_vector
-    joints = [np.eye(4) if base_pose is None else np.asarray(base_pose, float)]
-    for step in se3.exp_pose(twist * lengths[:, None]):
-        joints.append(joints[-1] @ step)
+    rate = np.linalg.norm(strains.k, axis=-1)
+    basis = se3.screw_basis(strains.twist_vector)
+    steps = np.einsum("ma,maij->mij", se3.screw_coefficients(rate, lengths), basis)
+    joints = np.empty((lengths.size + 1, 4, 4))
+    joints[0] = np.eye(4) if base_pose is None else base_pose
+    for i, step in enumerate(steps):
+        np.dot(joints[i], step, out=joints[i + 1])
     counts = np.maximum(np.ceil(lengths / spacing - 1e-9).astype(int), 1)
-    piece = np.repeat(np.arange(lengths.size), counts)
-    within = np.concatenate([np.arange(n) / n for n in counts]) * lengths[piece]
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    poses = np.array(joints)[piece] @ se3.exp_pose(twist[piece] * within[:, None])
-    return Centreline(np.append(starts[piece] + within, starts[-1]), np.append(poses, joints[-1][None], axis=0))
+    first = np.cumsum(counts) - counts
+    piece = np.repeat(np.arange(lengths.size), counts)
+    within = (np.arange(piece.size) - first[piece]) * (lengths / counts)[piece]
+    moved = (joints[:-1, None] @ basis).reshape(-1, 4, 16)
+    poses = np.empty((piece.size + 1, 4, 4))
+    np.matmul(se3.screw_coefficients(rate[piece], within)[:, None], moved[piece], out=poses[:-1].reshape(-1, 1, 16))
+    poses[-1] = joints[-1]
+    return Centreline(np.append(starts[piece] + within, starts[-1]), poses)

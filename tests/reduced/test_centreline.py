@@ -6,7 +6,7 @@ import pytest
 from base import se3
 from base.errors import InputError
 from base.strains import RodStrains
-from reduced.rod import centreline
+from reduced.centreline import centreline
 
 
 def test_bending_is_a_circle_towards_minus_z():
