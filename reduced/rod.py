@@ -1,0 +1,127 @@
+"""A rod that carries load: equilibria of segments in a row under gravity, tip and distributed loads.
+
+Each piece has its own law, pressure and mass; section frames are continuous at joints. Newton's method on the energy of elements with
+constant strains (reduced.rod_elements) finds the equilibrium, in load steps where a whole step fails; elements are halved until the
+answer stands still (reduced.rod_equilibrium). Loads are dead: fixed in space.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from base.errors import InputError
+from base.strains import RodStrains
+from geometry.loading import DeadLoads
+from reduced.centreline import Centreline, centreline
+from reduced.rod_equilibrium import refine
+from reduced.section import active_mass, passive_mass
+from reduced.section_laws import passive_law
+
+@dataclass(frozen=True)
+class Piece:
+    """A run of equal sections. length in mm; law: reduced.section_laws.RodLaw; pressure in MPa; mass per undeformed length in
+    tonne/mm with its centre (y, z) in mm."""
+
+    length: float
+    law: object
+    pressure: float = 0.0
+    mass: float = 0.0
+    mass_centre: tuple = (0.0, 0.0)
+
+    def __post_init__(self):
+        if not (np.isfinite(self.length) and self.length > 0):
+            raise InputError(f"length_mm = {self.length:g}: a piece of a rod must be longer than 0")
+        if not (np.isfinite(self.pressure) and self.pressure >= 0):
+            raise InputError(f"pressure_kPa = {self.pressure * 1e3:g}: give a finite value >= 0")
+        if not (np.isfinite(self.mass) and self.mass >= 0):
+            raise InputError(f"mass = {self.mass:g} tonne/mm: give a finite value >= 0")
+
+
+@dataclass(frozen=True)
+class Rod:
+    """Pieces from base to tip; base_pose (4, 4): the clamp's frame in space, mm; tip_centre: (y, z) in mm of the tip's frame where
+    tip forces act."""
+
+    pieces: tuple
+    base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
+    tip_centre: tuple = (0.0, 0.0)
+
+    def __post_init__(self):
+        object.__setattr__(self, "pieces", tuple(self.pieces))
+        object.__setattr__(self, "base_pose", np.asarray(self.base_pose, float))
+        if not self.pieces:
+            raise InputError("pieces: a rod needs at least one")
+        if self.base_pose.shape != (4, 4) or abs(self.base_pose[:3, :3].T @ self.base_pose[:3, :3] - np.eye(3)).max() > 1e-6:
+            raise InputError("base_pose: give a (4, 4) pose with a rotation matrix")
+
+    @classmethod
+    def of(cls, manipulator, laws, pressure, base_pose=None, end_effects=True):
+        """The rod of a Manipulator. laws, pressure (MPa): one for all segments or one for each.
+
+        end_effects: every chamber counts with its whole pitch, half a gap of the ends included (docs/theory-reduced.md); False: the
+        active length is that between the outermost chamber walls.
+        """
+        n = len(manipulator.segments)
+        laws = list(laws) if isinstance(laws, (list, tuple)) else [laws] * n
+        pressures = np.broadcast_to(np.asarray(pressure, float), n) if np.shape(pressure) in ((), (n,)) else ()
+        if len(laws) != n or len(pressures) != n:
+            raise InputError(f"laws, pressure_kPa: give one for all or one for each of the {n} segments")
+        pieces, known = [], {}
+        for segment, law, P in zip(manipulator.segments, laws, pressures):
+            reach = segment.gap / segment.sin / 2 if end_effects else 0.0
+            passive = known.setdefault(segment.key, passive_law(segment))
+            mass, z = passive_mass(segment)
+            end = Piece(segment.end_length - reach, passive, 0.0, mass, (0.0, z))
+            mass, z = active_mass(segment)
+            pieces += [end, Piece(segment.active_length + 2 * reach, law, float(P), mass, (0.0, z)), end]
+        last = manipulator.segments[-1]
+        return cls(pieces, np.eye(4) if base_pose is None else base_pose, (0.0, (last.core_bottom + last.core_top) / 2))
+
+    @property
+    def lengths(self):
+        """(pieces,) undeformed, mm."""
+        return np.array([p.length for p in self.pieces])
+
+    @property
+    def free_strains(self):
+        """RodStrains (pieces, 3) without loads."""
+        q = np.array([p.law.free_strains(p.pressure) for p in self.pieces])
+        return RodStrains(q[:, :3], q[:, 3:])
+
+    def free(self, spacing=1.0):
+        """The Centreline without loads, sampled every `spacing` mm."""
+        return centreline(self.lengths, self.free_strains, spacing, self.base_pose)
+
+    def equilibrium(self, loads=DeadLoads(), distributed=(0.0, 0.0, 0.0), tolerance=1e-4):
+        """The RodState under `loads` (geometry.loading.DeadLoads, in the coordinates of base_pose) and `distributed` (3,), a force on
+        the line in N per mm of undeformed length.
+
+        tolerance: of the rod's length; elements are halved until the nodes' estimated error is below. ConvergenceError, with the
+        share of the loads that was reached, where no stable equilibrium follows (with a tip moment: no equilibrium).
+        """
+        if not tolerance > 0:
+            raise InputError(f"tolerance = {tolerance:g} must be larger than 0")
+        vectors = [np.asarray(v, float) for v in (loads.gravity, loads.tip_force, loads.tip_moment, distributed)]
+        if any(v.shape != (3,) or not np.isfinite(v).all() for v in vectors):
+            raise InputError("loads: give three finite numbers each for gravity, tip_force, tip_moment and distributed")
+        s, poses, wrench, *effort = refine(self, vectors, tolerance)
+        return RodState(Centreline(s, poses), wrench[:, 3:], wrench[:, :3], *effort)
+
+
+@dataclass(frozen=True)
+class RodState:
+    """An equilibrium. line: Centreline of the elements' ends, exact in between; force (n, 3) in N and moment (n, 3) in N mm of the n
+    elements, in their section frames; error: estimate of how far the nodes are from where infinitely many elements put them, mm;
+    iterations, load_steps: what it took, all refinements together."""
+
+    line: Centreline
+    force: np.ndarray
+    moment: np.ndarray
+    error: float
+    iterations: int
+    load_steps: int
+
+    @property
+    def tip(self):
+        """(4, 4) frame of the tip."""
+        return self.line.poses[-1]

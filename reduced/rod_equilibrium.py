@@ -1,0 +1,112 @@
+"""The way to a rod's equilibrium: Newton's method, load steps where a whole one fails, elements halved until the answer stands still."""
+
+import numpy as np
+
+from base.errors import ConvergenceError
+from reduced.rod_elements import NodalLoads, RodElements, is_minimum
+
+ITERATIONS = 12
+#: of a Newton step, strains and k times the rod's length: convergence is quadratic, so the next one would be rounding
+SMALL_STEP = 1e-6
+#: a Newton step that turns an element more (rad) or strains it more is not to be trusted
+LARGE_TURN, LARGE_STRAIN = 1.0, 0.5
+SMALLEST_LOAD_STEP = 1 / 2048
+#: the coarsest elements: shares of the rod's length that turn less than this (rad) in the free state; and how often they are halved
+FIRST_ELEMENTS, FIRST_TURN, HALVINGS = 8, 0.7, 8
+
+
+class Grid:
+    """A rod cut into elements, counts (pieces,) of them, with its loads at the nodes.
+
+    vectors: gravity (3,) in mm/s2, tip force in N, tip moment in N mm, distributed force in N/mm.
+    """
+
+    def __init__(self, rod, counts, vectors):
+        gravity, tip_force, tip_moment, distributed = vectors
+        self.counts, self.iterations, self.load_steps = counts, 0, 0
+        owner = np.repeat(np.arange(len(counts)), counts)
+        h = (rod.lengths / counts)[owner]
+        self.s = np.concatenate([[0.0], np.cumsum(h)])
+        self.elements = RodElements(h, [rod.pieces[i] for i in owner], rod.base_pose)
+        self.loads = NodalLoads(len(h))
+        mass = np.array([p.mass for p in rod.pieces])[owner] * h
+        centre = np.array([(0.0, *p.mass_centre) for p in rod.pieces])[owner]
+        # half of an element's load at either end; the clamp takes what is at node 0
+        for part, elements in ((slice(None), slice(None)), (slice(None, -1), slice(1, None))):
+            self.loads.add(part, 0.5 * mass[elements, None] * gravity, centre[elements])
+            self.loads.add(part, 0.5 * h[elements, None] * distributed)
+        self.loads.add(-1, tip_force, (0.0, *rod.tip_centre))
+        self.loads.moments[-1] += tip_moment
+
+    def from_coarser(self, coarse, x):
+        """x (n, 6) of the grid `coarse` on this one: linear in between within each piece."""
+        out = []
+        for start, count, finer in zip(np.cumsum(coarse.counts) - coarse.counts, coarse.counts, self.counts):
+            own = x[start : start + count]
+            if finer == count:
+                out.append(own)
+                continue
+            slope = np.gradient(own, axis=0) if count > 1 else np.zeros_like(own)
+            out.append(np.stack([own - slope / 4, own + slope / 4], axis=1).reshape(-1, 6))
+        return np.concatenate(out)
+
+    def newton(self, x, factor):
+        """The equilibrium near x (n, 6) under `factor` of the loads, or None: not found, or (without moments) not stable."""
+        loads, reach, h = self.loads.scaled(factor), self.s[-1], self.elements.lengths
+        for _ in range(ITERATIONS):
+            self.iterations += 1
+            step, tangent = self.elements.newton_step(x, loads)
+            if step is None or not np.isfinite(step).all():
+                return None
+            k, e = np.linalg.norm(step[:, :3], axis=1), abs(step[:, 3:]).max()
+            if (k * h).max() > LARGE_TURN or e > LARGE_STRAIN:
+                return None
+            x = x + step
+            if max(k.max() * reach, e) < SMALL_STEP:
+                return x if not loads.conservative or is_minimum(tangent) else None
+        return None
+
+    def follow(self):
+        """The equilibrium reached from the free state, the loads growing as fast as Newton's method lets them."""
+        x, before, reached, step = self.elements.free(), None, 0.0, 1.0
+        while reached < 1.0:
+            aim = min(1.0, reached + step)
+            guess = x if before is None else x + (x - before[0]) * (aim - reached) / (reached - before[1])
+            found = self.newton(guess, aim)
+            if found is None:
+                step = (aim - reached) / 2
+                if step < SMALLEST_LOAD_STEP:
+                    raise ConvergenceError(
+                        f"rod: no stable equilibrium follows beyond {100 * reached:.4g} % of the loads: the rod buckles or snaps there; "
+                        "lower the loads, or disturb a perfect symmetry by a small side force"
+                    )
+                continue
+            self.load_steps += 1
+            before, x, reached, step = (x, reached), found, aim, 2 * (aim - reached)
+        return x
+
+
+def refine(rod, vectors, tolerance):
+    """(s (n + 1,), poses (n + 1, 4, 4), wrenches (n, 6), error in mm, iterations, load steps) of a rod's equilibrium.
+
+    vectors: see Grid. tolerance: of the length. The error of constant strains is of second order, so an answer is three times
+    nearer to the limit than to that of elements twice as long.
+    """
+    lengths, turn = rod.lengths, np.linalg.norm(rod.free_strains.k, axis=1)
+    size = np.minimum(lengths.sum() / FIRST_ELEMENTS, FIRST_TURN / np.maximum(turn, 1e-12))
+    coarse, iterations, load_steps, error = None, 0, 0, np.inf
+    for halvings in range(HALVINGS + 1):
+        # powers of two, so that every node remains one
+        counts = 2 ** np.maximum(np.ceil(np.log2(lengths * 2**halvings / size) - 1e-9), 0).astype(int)
+        grid = Grid(rod, counts, vectors)
+        x = None if coarse is None else grid.newton(grid.from_coarser(coarse, x_coarse), 1.0)
+        x = grid.follow() if x is None else x
+        poses = grid.elements.poses(x)
+        iterations, load_steps = iterations + grid.iterations, load_steps + grid.load_steps
+        if coarse is not None:
+            kept = np.concatenate([[0], np.cumsum(np.repeat(counts // coarse.counts, coarse.counts))])
+            error = float(np.linalg.norm(poses[kept, :3, 3] - poses_coarse[:, :3, 3], axis=1).max() / 3)
+            if error <= tolerance * lengths.sum():
+                return grid.s, poses, grid.elements.wrenches(x), error, iterations, load_steps
+        coarse, x_coarse, poses_coarse = grid, x, poses
+    raise ConvergenceError(f"rod: {len(x)} elements leave an error of {error:.2g} mm: ask for a larger tolerance")
