@@ -30,15 +30,6 @@ def _series():
 _SERIES = _series()
 
 
-def _coefficients(twist):
-    """(n, 4) a1..a4 and (n, 4) their derivatives by t, for twists (n, 6) that turn by at most 4 rad."""
-    t = np.sum(twist[:, :3] ** 2, axis=1)
-    powers = np.empty((len(t), TERMS))
-    powers[:, 0], powers[:, 1:] = 1.0, t[:, None]
-    found = np.multiply.accumulate(powers, axis=1) @ _SERIES
-    return found[:, :4], found[:, 4:]
-
-
 def commutator(twist):
     """ad (n, 6, 6) of twists (n, 6): ad(X) Y is the twist of the matrices' X Y - Y X."""
     W = hat(twist[:, :3])
@@ -65,24 +56,29 @@ def wrench_commutator(wrench):
     return out
 
 
-def left_jacobian(twist):
-    """J (n, 6, 6) of twists (n, 6): d exp(X) = hat(J dX) exp(X)."""
-    a, ad = _coefficients(twist)[0][:, :, None, None], commutator(twist)
-    ad2 = ad @ ad
-    return np.eye(6) + a[:, 0] * ad + a[:, 1] * ad2 + (a[:, 2] * ad + a[:, 3] * ad2) @ ad2
+class LeftJacobian:
+    """matrix: J (n, 6, 6) of twists (n, 6), d exp(X) = hat_pose(J dX) exp(X); exact to rounding for turns up to 4 rad."""
 
+    def __init__(self, twist):
+        self._along = np.zeros_like(twist)  # dt/2 by the twist
+        self._along[:, :3] = twist[:, :3]
+        t = np.sum(twist[:, :3] ** 2, axis=1)
+        powers = np.empty((len(t), TERMS))
+        powers[:, 0], powers[:, 1:] = 1.0, t[:, None]
+        #: (8, n, 1, 1): a1..a4 and their derivatives by t
+        self._a = (np.multiply.accumulate(powers, axis=1) @ _SERIES).T[:, :, None, None]
+        self._ad = commutator(twist)
+        ad2, a = self._ad @ self._ad, self._a
+        self.matrix = a[0] * self._ad + a[1] * ad2 + (a[2] * self._ad + a[3] * ad2) @ ad2
+        self.matrix += np.eye(6)
 
-def left_jacobian_slope(twist, wrench):
-    """D (n, 6, 6): derivative by the twist of J(twist)^T w, for twists (n, 6) and constant wrenches (n, 6)."""
-    a, slope = _coefficients(twist)
-    transposed = np.swapaxes(commutator(twist), 1, 2)
-    along = np.zeros((len(twist), 6))  # dt/2
-    along[:, :3] = twist[:, :3]
-    y, Y = wrench, np.zeros((len(twist), 6, 6))
-    out = np.zeros((len(twist), 6, 6))
-    for i in range(4):
-        # y = ad^T y and its derivative Y
-        Y = wrench_commutator(y) + transposed @ Y
-        y = (transposed @ y[:, :, None])[:, :, 0]
-        out += a[:, i, None, None] * Y + (2 * slope[:, i, None] * y)[:, :, None] * along[:, None]
-    return out
+    def slope(self, wrench):
+        """(n, 6, 6): derivative by the twist of J^T w, for constant wrenches (n, 6)."""
+        transposed, a, along = np.swapaxes(self._ad, 1, 2), self._a, 2 * self._along[:, None]
+        y, Y, out = wrench[:, :, None], 0.0, 0.0
+        for i in range(4):
+            # y = (ad^T)^i w and its derivative Y
+            Y = wrench_commutator(y[:, :, 0]) + (transposed @ Y if i else 0.0)
+            y = transposed @ y
+            out = out + a[i] * Y + (a[4 + i] * y) * along
+        return out

@@ -14,8 +14,10 @@ def hat(vector):
     """Skew matrices (..., 3, 3) of vectors (..., 3): hat(a) b = a x b."""
     v = np.asarray(vector, float)
     out = np.zeros(v.shape[:-1] + (3, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return out - np.swapaxes(out, -1, -2)
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = x, y, z
+    out[..., 1, 2], out[..., 2, 0], out[..., 0, 1] = -x, -y, -z
+    return out
 
 
 def _coefficients(angle):

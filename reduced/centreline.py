@@ -85,7 +85,7 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
     joints = np.empty((lengths.size + 1, 4, 4))
     joints[0] = np.eye(4) if base_pose is None else base_pose
     for i, step in enumerate(steps):
-        np.dot(joints[i], step, out=joints[i + 1])
+        joints[i].dot(step, joints[i + 1])
     counts = np.maximum(np.ceil(lengths / spacing - 1e-9).astype(int), 1)
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
     first = np.cumsum(counts) - counts

@@ -92,7 +92,7 @@ class Rod:
         """The Centreline without loads, sampled every `spacing` mm."""
         return centreline(self.lengths, self.free_strains, spacing, self.base_pose)
 
-    def equilibrium(self, loads=DeadLoads(), distributed=(0.0, 0.0, 0.0), tolerance=1e-4):
+    def equilibrium(self, loads=DeadLoads(), distributed=(0.0, 0.0, 0.0), tolerance=5e-4):
         """The RodState under `loads` (geometry.loading.DeadLoads, in the coordinates of base_pose) and `distributed` (3,), a force on
         the line in N per mm of undeformed length.
 

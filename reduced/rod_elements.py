@@ -11,7 +11,7 @@ from scipy.linalg import LinAlgError, cholesky_banded
 from scipy.linalg.lapack import dgbsv
 
 from base import se3
-from base.left_jacobian import adjoint, left_jacobian, left_jacobian_slope, wrench_commutator
+from base.left_jacobian import LeftJacobian, adjoint, wrench_commutator
 
 #: e and k of a law's strains in the order of a twist, and back
 TWIST_ORDER = np.array([3, 4, 5, 0, 1, 2])
@@ -73,7 +73,7 @@ class RodElements:
         out = np.empty((len(x) + 1, 4, 4))
         out[0] = self.base_pose
         for i, step in enumerate(se3.exp_pose(x * self.lengths[:, None])):
-            np.dot(out[i], step, out=out[i + 1])
+            out[i].dot(step, out[i + 1])
         return out
 
     def energy(self, x, loads):
@@ -99,17 +99,17 @@ class RodElements:
 
     def _carriers(self, x, poses):
         """A (n, 6, 6): the spatial twist of all nodes behind an element per change of its x."""
-        return self._h * (adjoint(poses[:-1]) @ left_jacobian(x * self.lengths[:, None]))
+        return self._h * (adjoint(poses[:-1]) @ LeftJacobian(x * self.lengths[:, None]).matrix)
 
     def _linearised(self, x, loads):
         """(inverses of A, the tangent's blocks (diagonal, lower, upper) and the imbalance (n, 6) in the nodes' spatial twists)."""
         poses = self.poses(x)
-        A = self._carriers(x, poses)
-        inverse = np.linalg.inv(A)
+        J, Ad = LeftJacobian(x * self.lengths[:, None]), adjoint(poses[:-1])
+        inverse = np.linalg.inv(self._h * (Ad @ J.matrix))
         outward, turned, forces = _outward(poses[1:], loads)
-        local = (_transposed(adjoint(poses[:-1])) @ outward[..., None])[..., 0]
+        local = (_transposed(Ad) @ outward[..., None])[..., 0]
         material = self._by_law("stiffness", x, (6, 6))[:, TWIST_ORDER[:, None], TWIST_ORDER]
-        own = self._h * (material - self._h * left_jacobian_slope(x * self.lengths[:, None], local))
+        own = self._h * (material - self._h * J.slope(local))
         M = _transposed(inverse) @ own @ inverse
         inward = (_transposed(inverse) @ (self.lengths[:, None] * self.wrenches(x))[..., None])[..., 0]
         C = wrench_commutator(outward)

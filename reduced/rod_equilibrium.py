@@ -6,13 +6,11 @@ from base.errors import ConvergenceError
 from reduced.rod_elements import NodalLoads, RodElements, is_minimum
 
 ITERATIONS = 12
-#: of a Newton step, strains and k times the rod's length: convergence is quadratic, so the next one would be rounding
-SMALL_STEP = 1e-6
-#: a Newton step that turns an element more (rad) or strains it more is not to be trusted
-LARGE_TURN, LARGE_STRAIN = 1.0, 0.5
+#: a Newton step turns the rod by at most so much, summed along it (rad), and strains it by at most so much; longer ones are shortened
+LARGEST_TURN, LARGEST_STRAIN = 2.0, 0.3
 SMALLEST_LOAD_STEP = 1 / 2048
 #: the coarsest elements: shares of the rod's length that turn less than this (rad) in the free state; and how often they are halved
-FIRST_ELEMENTS, FIRST_TURN, HALVINGS = 8, 0.7, 8
+FIRST_ELEMENTS, FIRST_TURN, HALVINGS = 16, 0.4, 8
 
 
 class Grid:
@@ -50,8 +48,11 @@ class Grid:
             out.append(np.stack([own - slope / 4, own + slope / 4], axis=1).reshape(-1, 6))
         return np.concatenate(out)
 
-    def newton(self, x, factor):
-        """The equilibrium near x (n, 6) under `factor` of the loads, or None: not found, or (without moments) not stable."""
+    def newton(self, x, factor, small):
+        """The equilibrium near x (n, 6) under `factor` of the loads, or None: not found, or (without moments) not stable.
+
+        small: the step (strains, k times the length) after which to stop; the next one would be of the order of its square.
+        """
         loads, reach, h = self.loads.scaled(factor), self.s[-1], self.elements.lengths
         for _ in range(ITERATIONS):
             self.iterations += 1
@@ -59,20 +60,18 @@ class Grid:
             if step is None or not np.isfinite(step).all():
                 return None
             k, e = np.linalg.norm(step[:, :3], axis=1), abs(step[:, 3:]).max()
-            if (k * h).max() > LARGE_TURN or e > LARGE_STRAIN:
-                return None
-            x = x + step
-            if max(k.max() * reach, e) < SMALL_STEP:
+            x = x + step / max(1.0, k @ h / LARGEST_TURN, e / LARGEST_STRAIN)
+            if max(k.max() * reach, e) < small:
                 return x if not loads.conservative or is_minimum(tangent) else None
         return None
 
-    def follow(self):
+    def follow(self, small):
         """The equilibrium reached from the free state, the loads growing as fast as Newton's method lets them."""
         x, before, reached, step = self.elements.free(), None, 0.0, 1.0
         while reached < 1.0:
             aim = min(1.0, reached + step)
             guess = x if before is None else x + (x - before[0]) * (aim - reached) / (reached - before[1])
-            found = self.newton(guess, aim)
+            found = self.newton(guess, aim, small)
             if found is None:
                 step = (aim - reached) / 2
                 if step < SMALLEST_LOAD_STEP:
@@ -99,8 +98,8 @@ def refine(rod, vectors, tolerance):
         # powers of two, so that every node remains one
         counts = 2 ** np.maximum(np.ceil(np.log2(lengths * 2**halvings / size) - 1e-9), 0).astype(int)
         grid = Grid(rod, counts, vectors)
-        x = None if coarse is None else grid.newton(grid.from_coarser(coarse, x_coarse), 1.0)
-        x = grid.follow() if x is None else x
+        x = None if coarse is None else grid.newton(grid.from_coarser(coarse, x_coarse), 1.0, tolerance)
+        x = grid.follow(tolerance) if x is None else x
         poses = grid.elements.poses(x)
         iterations, load_steps = iterations + grid.iterations, load_steps + grid.load_steps
         if coarse is not None:

@@ -5,6 +5,7 @@ k1, k2, k3), 1/mm for k, at a pressure P in MPa. Its minimiser is the free state
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -29,7 +30,7 @@ class RodLaw(Protocol):
         """(..., 6, 6) Hessian of psi, N, N mm and N mm2; symmetric."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class QuadraticLaw:
     """psi = (q - q0)^T K (q - q0)/2 with q0 and K linear in the pressure between given states.
 
@@ -52,6 +53,7 @@ class QuadraticLaw:
             raise InputError("stiffnesses: must be positive definite: a state at or beyond a limit point carries no rod")
         for name, value in (("pressures", p), ("strains", q), ("stiffnesses", K)):
             object.__setattr__(self, name, value)
+        object.__setattr__(self, "_known", lru_cache(maxsize=64)(self._interpolated))
 
     @classmethod
     def of_states(cls, states):
@@ -64,16 +66,17 @@ class QuadraticLaw:
 
     def _at(self, P):
         """(q0 (..., 6), K (..., 6, 6)) at P."""
-        if len(self.pressures) == 1:
-            shape = np.shape(P)
-            return np.broadcast_to(self.strains[0], shape + (6,)), np.broadcast_to(self.stiffnesses[0], shape + (6, 6))
-        P = np.asarray(P, float)
-        if not (P >= self.pressures[0]).all() or not (P <= self.pressures[-1]).all():
-            raise InputError(f"pressure_kPa: this law knows {self.pressures[0] * 1e3:g}..{self.pressures[-1] * 1e3:g} kPa")
-        i = np.clip(np.searchsorted(self.pressures, P) - 1, 0, len(self.pressures) - 2)
-        w = ((P - self.pressures[i]) / (self.pressures[i + 1] - self.pressures[i]))[..., None]
-        q = (1 - w) * self.strains[i] + w * self.strains[i + 1]
-        return q, (1 - w[..., None]) * self.stiffnesses[i] + w[..., None] * self.stiffnesses[i + 1]
+        return self._interpolated(P) if np.ndim(P) else self._known(P)
+
+    def _interpolated(self, P):
+        p, q, K = self.pressures, self.strains, self.stiffnesses
+        if len(p) == 1:
+            return q[0] + np.zeros((*np.shape(P), 1)), K[0] + np.zeros((*np.shape(P), 1, 1))
+        if not (np.min(P) >= p[0] and np.max(P) <= p[-1]):
+            raise InputError(f"pressure_kPa: this law knows {p[0] * 1e3:g}..{p[-1] * 1e3:g} kPa")
+        i = np.minimum(np.searchsorted(p, P, side="right"), len(p) - 1) - 1
+        w = np.asarray((P - p[i]) / (p[i + 1] - p[i]))[..., None]
+        return q[i] + w * (q[i + 1] - q[i]), K[i] + w[..., None] * (K[i + 1] - K[i])
 
     def free_strains(self, P):
         return self._at(P)[0]
@@ -86,7 +89,7 @@ class QuadraticLaw:
         return (K @ (q - free)[..., None])[..., 0]
 
     def stiffness(self, q, P):
-        return np.broadcast_to(self._at(P)[1], np.shape(q) + (6,))
+        return self._at(P)[1] + np.zeros((*np.shape(q)[:-1], 1, 1))
 
 
 def beam_stiffness(rectangles, torsion):
