@@ -12,6 +12,7 @@ import numpy as np
 from base.errors import InputError
 from base.strains import RodStrains
 from geometry.loading import DeadLoads
+from geometry.parameters import ONE_SIDED
 from reduced.centreline import Centreline, centreline
 from reduced.rod_equilibrium import refine
 from reduced.section import active_mass, passive_mass
@@ -58,8 +59,8 @@ class Rod:
     def of(cls, manipulator, laws, pressure, base_pose=None, end_effects=True):
         """The rod of a Manipulator. laws, pressure (MPa): one for all segments or one for each.
 
-        end_effects: every chamber counts with its whole pitch, half a gap of the ends included (docs/theory-reduced.md); False: the
-        active length is that between the outermost chamber walls.
+        end_effects (docs/theory-reduced.md): every chamber counts with its whole pitch, half a gap at the ends included, and the
+        ends of slanted one-sided segments turn about z; False: active from outermost wall to outermost wall, ends straight.
         """
         n = len(manipulator.segments)
         laws = list(laws) if isinstance(laws, (list, tuple)) else [laws] * n
@@ -67,13 +68,14 @@ class Rod:
         if len(laws) != n or len(pressures) != n:
             raise InputError(f"laws, pressure_kPa: give one for all or one for each of the {n} segments")
         pieces, known = [], {}
-        for segment, law, P in zip(manipulator.segments, laws, pressures):
+        for segment, law, P in zip(manipulator.segments, laws, map(float, pressures)):
             reach = segment.gap / segment.sin / 2 if end_effects else 0.0
-            passive = known.setdefault(segment.key, passive_law(segment))
-            mass, z = passive_mass(segment)
-            end = Piece(segment.end_length - reach, passive, 0.0, mass, (0.0, z))
+            turn = end_turn(segment, law.free_strains(P)) if end_effects else 0.0
+            length, (mass, z) = segment.end_length - reach, passive_mass(segment)
+            bare = [known.setdefault((segment.key, t), passive_law(segment, t)) for t in (turn / length, -turn / length)]
+            before, behind = (Piece(length, own, 0.0, mass, (0.0, z)) for own in bare)
             mass, z = active_mass(segment)
-            pieces += [end, Piece(segment.active_length + 2 * reach, law, float(P), mass, (0.0, z)), end]
+            pieces += [before, Piece(segment.active_length + 2 * reach, law, P, mass, (0.0, z)), behind]
         last = manipulator.segments[-1]
         return cls(pieces, np.eye(4) if base_pose is None else base_pose, (0.0, (last.core_bottom + last.core_top) / 2))
 
@@ -106,6 +108,15 @@ class Rod:
             raise InputError("loads: give three finite numbers each for gravity, tip_force, tip_moment and distributed")
         s, poses, wrench, *effort = refine(self, vectors, tolerance)
         return RodState(Centreline(s, poses), wrench[:, 3:], wrench[:, :3], *effort)
+
+
+def end_turn(segment, free):
+    """Turn (rad) about z of the section frame from the bare base end to the active part with free strains (6,); at the tip end back.
+
+    A line at height z of the section runs at the slope e2 - k1 z to the frame's x axis. The bottom of a one-sided core carries no
+    chambers, and slanted ones do not shear it: the line along it goes on straight from the bare end. (Measured, not derived.)
+    """
+    return float(free[3] * segment.core_bottom - free[1]) if segment.kind == ONE_SIDED else 0.0
 
 
 @dataclass(frozen=True)

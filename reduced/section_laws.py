@@ -110,8 +110,9 @@ def beam_stiffness(rectangles, torsion):
     return move.T @ own @ move
 
 
-def passive_law(segment):
-    """The QuadraticLaw of a segment's bare core with its channel: ends, plugs and joints, which the pressure leaves unstrained.
+def passive_law(segment, curvature=0.0):
+    """The QuadraticLaw of a segment's bare core with its channel: ends, plugs and joints, which the pressure leaves unstrained;
+    curvature: free curvature about z, 1/mm, all the same (reduced.rod.end_turn).
 
     (Around a thin bore in an incompressible core, thrust on the cap and pressure on the wall cancel in the elongation.) Torsion is
     that of the full rectangle (Timoshenko & Goodier, Theory of Elasticity, Sec. 109) less the channel's polar moment.
@@ -130,4 +131,4 @@ def passive_law(segment):
     torsion -= s.channel_width * s.channel_height * (s.channel_width**2 + s.channel_height**2) / 12
     mean = sum(2 * w * (b - a) * m for w, a, b, m in rectangles) / sum(2 * w * (b - a) * np.sign(m) for w, a, b, m in rectangles[:2])
     rest = RodStrains.unstrained()
-    return QuadraticLaw([0.0], [[*rest.e, *rest.k]], [beam_stiffness(rectangles, mean * torsion)])
+    return QuadraticLaw([0.0], [[*rest.e, *rest.k[:2], curvature]], [beam_stiffness(rectangles, mean * torsion)])
