@@ -60,6 +60,7 @@ class LeftJacobian:
     """matrix: J (n, 6, 6) of twists (n, 6), d exp(X) = hat_pose(J dX) exp(X); exact to rounding for turns up to 4 rad."""
 
     def __init__(self, twist):
+        self._twist = twist
         self._along = np.zeros_like(twist)  # dt/2 by the twist
         self._along[:, :3] = twist[:, :3]
         t = np.sum(twist[:, :3] ** 2, axis=1)
@@ -71,6 +72,15 @@ class LeftJacobian:
         ad2, a = self._ad @ self._ad, self._a
         self.matrix = a[0] * self._ad + a[1] * ad2 + (a[2] * self._ad + a[3] * ad2) @ ad2
         self.matrix += np.eye(6)
+
+    @property
+    def pose(self):
+        """exp(X) (n, 4, 4): its rotation and translation are in J."""
+        V, out = self.matrix[:, :3, :3], np.zeros((len(self._twist), 4, 4))
+        out[:, :3, :3] = np.eye(3) + self._ad[:, :3, :3] @ V
+        out[:, :3, 3] = (V @ self._twist[:, 3:, None])[:, :, 0]
+        out[:, 3, 3] = 1.0
+        return out
 
     def slope(self, wrench):
         """(n, 6, 6): derivative by the twist of J^T w, for constant wrenches (n, 6)."""

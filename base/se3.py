@@ -21,20 +21,19 @@ def hat(vector):
 
 
 def _coefficients(angle):
-    """sin t/t, (1-cos t)/t^2, (t-sin t)/t^3 for angles t of any shape."""
+    """sin t/t, (1-cos t)/t^2 for angles t of any shape."""
     t2 = angle * angle
     small = angle < SMALL
     t = np.where(small, 1.0, angle)
     a = np.where(small, 1 - t2 / 6, np.sin(t) / t)
     b = np.where(small, 0.5 - t2 / 24, 2 * np.sin(t / 2) ** 2 / t**2)
-    c = np.where(small, 1 / 6 - t2 / 120, (t - np.sin(t)) / t**3)
-    return a[..., None, None], b[..., None, None], c[..., None, None]
+    return a[..., None, None], b[..., None, None]
 
 
 def exp_rotation(vector):
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
     W = hat(vector)
-    a, b, _ = _coefficients(np.linalg.norm(vector, axis=-1))
+    a, b = _coefficients(np.linalg.norm(vector, axis=-1))
     return np.eye(3) + a * W + b * W @ W
 
 
@@ -65,10 +64,15 @@ def screw_basis(twist):
 
 def screw_coefficients(rate, s=1.0):
     """(..., 4) coefficients of `screw_basis` in exp(s X), for |w| = rate: 1, s, s^2 (1 - cos t)/t^2, s^3 (t - sin t)/t^3, t = s rate."""
-    _, b, c = _coefficients(s * rate)
-    b, c = b[..., 0, 0], c[..., 0, 0]
-    out = np.empty(b.shape + (4,))
-    out[..., 0], out[..., 1], out[..., 2], out[..., 3] = 1.0, s, s * s * b, s * s * s * c
+    t = s * rate
+    small = abs(t) < SMALL
+    ts = np.where(small, 1.0, t)
+    half, ratio = np.sin(ts / 2), s / ts
+    squared, t2 = ratio * ratio, t * t
+    out = np.empty(t.shape + (4,))
+    out[..., 0], out[..., 1] = 1.0, s
+    out[..., 2] = np.where(small, s * s * (0.5 - t2 / 24), 2 * half * half * squared)
+    out[..., 3] = np.where(small, s * s * s * (1 / 6 - t2 / 120), (ts - np.sin(ts)) * squared * ratio)
     return out
 
 

@@ -79,13 +79,7 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
         raise InputError(f"strains: give e and k of shape ({lengths.size}, 3), one row for every piece")
     if not spacing > 0:
         raise InputError(f"spacing = {spacing:g} mm must be larger than 0")
-    rate = np.linalg.norm(strains.k, axis=-1)
-    basis = se3.screw_basis(strains.twist_vector)
-    steps = np.einsum("ma,maij->mij", se3.screw_coefficients(rate, lengths), basis)
-    joints = np.empty((lengths.size + 1, 4, 4))
-    joints[0] = np.eye(4) if base_pose is None else base_pose
-    for i, step in enumerate(steps):
-        joints[i].dot(step, joints[i + 1])
+    rate, basis, joints = _joints(lengths, strains, base_pose)
     counts = np.maximum(np.ceil(lengths / spacing - 1e-9).astype(int), 1)
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
     first = np.cumsum(counts) - counts
@@ -96,3 +90,39 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
     np.matmul(se3.screw_coefficients(rate[piece], within)[:, None], moved[piece], out=poses[:-1].reshape(-1, 1, 16))
     poses[-1] = joints[-1]
     return Centreline(np.append(starts[piece] + within, starts[-1]), poses)
+
+
+def free_shapes(lengths, strains, samples=20, base_pose=None):
+    """(s (n, m samples + 1) in mm, poses (n, m samples + 1, 4, 4)) of n designs at once, of m pieces each.
+
+    lengths : (n, m) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (n, m, 3). samples : points of every
+    piece, joints included. base_pose : (4, 4) or (n, 4, 4), default the identity. What `centreline` does for one.
+    """
+    lengths = np.asarray(lengths, float)
+    if lengths.ndim != 2 or not lengths.size or not (lengths > 0).all():
+        raise InputError("lengths: give (designs, pieces) lengths larger than 0 mm")
+    if strains.e.shape != (*lengths.shape, 3) or strains.k.shape != (*lengths.shape, 3):
+        raise InputError(f"strains: give e and k of shape {(*lengths.shape, 3)}, one row for every piece of every design")
+    if samples < 1:
+        raise InputError(f"samples = {samples}: give at least 1 for every piece")
+    n, m = lengths.shape
+    rate, basis, joints = _joints(lengths, strains, base_pose)
+    within = lengths[..., None] * np.arange(samples) / samples
+    s, poses = np.empty((n, m * samples + 1)), np.empty((n, m * samples + 1, 4, 4))
+    s[:, :-1] = (within + (np.cumsum(lengths, axis=1) - lengths)[..., None]).reshape(n, -1)
+    moved = (joints[:, :-1, None] @ basis).reshape(n, m, 4, 16)
+    poses[:, :-1] = (se3.screw_coefficients(rate[..., None], within) @ moved).reshape(n, -1, 4, 4)
+    s[:, -1], poses[:, -1] = lengths.sum(axis=1), joints[:, -1]
+    return s, poses
+
+
+def _joints(lengths, strains, base_pose):
+    """(|k| (..., m), screw bases (..., m, 4, 4, 4), poses of the joints (..., m + 1, 4, 4)) of pieces in a row."""
+    rate = np.linalg.norm(strains.k, axis=-1)
+    basis = se3.screw_basis(strains.twist_vector)
+    steps = np.einsum("...a,...aij->...ij", se3.screw_coefficients(rate, lengths), basis)
+    joints = np.empty((lengths.shape[-1] + 1, *lengths.shape[:-1], 4, 4))
+    joints[0] = np.eye(4) if base_pose is None else base_pose
+    for i, step in enumerate(np.moveaxis(steps, -3, 0)):
+        np.matmul(joints[i], step, out=joints[i + 1])
+    return rate, basis, np.moveaxis(joints, 0, -3)

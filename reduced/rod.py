@@ -18,6 +18,7 @@ from reduced.rod_equilibrium import refine
 from reduced.section import active_mass, passive_mass
 from reduced.section_laws import passive_law
 
+
 @dataclass(frozen=True)
 class Piece:
     """A run of equal sections. length in mm; law: reduced.section_laws.RodLaw; pressure in MPa; mass per undeformed length in
@@ -94,13 +95,14 @@ class Rod:
         """The Centreline without loads, sampled every `spacing` mm."""
         return centreline(self.lengths, self.free_strains, spacing, self.base_pose)
 
-    def equilibrium(self, loads=DeadLoads(), distributed=(0.0, 0.0, 0.0), tolerance=5e-4):
+    def equilibrium(self, loads=None, distributed=(0.0, 0.0, 0.0), tolerance=5e-4):
         """The RodState under `loads` (geometry.loading.DeadLoads, in the coordinates of base_pose) and `distributed` (3,), a force on
         the line in N per mm of undeformed length.
 
         tolerance: of the rod's length; elements are halved until the nodes' estimated error is below. ConvergenceError, with the
         share of the loads that was reached, where no stable equilibrium follows (with a tip moment: no equilibrium).
         """
+        loads = loads or DeadLoads()
         if not tolerance > 0:
             raise InputError(f"tolerance = {tolerance:g} must be larger than 0")
         vectors = [np.asarray(v, float) for v in (loads.gravity, loads.tip_force, loads.tip_moment, distributed)]

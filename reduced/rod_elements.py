@@ -70,10 +70,13 @@ class RodElements:
 
     def poses(self, x):
         """(n + 1, 4, 4) frames of the nodes."""
-        out = np.empty((len(x) + 1, 4, 4))
+        return self._chained(se3.exp_pose(x * self.lengths[:, None]))
+
+    def _chained(self, steps):
+        out = np.empty((len(steps) + 1, 4, 4))
         out[0] = self.base_pose
-        for i, step in enumerate(se3.exp_pose(x * self.lengths[:, None])):
-            out[i].dot(step, out[i + 1])
+        for before, step, after in zip(out, steps, out[1:]):
+            before.dot(step, after)
         return out
 
     def energy(self, x, loads):
@@ -103,8 +106,9 @@ class RodElements:
 
     def _linearised(self, x, loads):
         """(inverses of A, the tangent's blocks (diagonal, lower, upper) and the imbalance (n, 6) in the nodes' spatial twists)."""
-        poses = self.poses(x)
-        J, Ad = LeftJacobian(x * self.lengths[:, None]), adjoint(poses[:-1])
+        J = LeftJacobian(x * self.lengths[:, None])
+        poses = self._chained(J.pose)
+        Ad = adjoint(poses[:-1])
         inverse = np.linalg.inv(self._h * (Ad @ J.matrix))
         outward, turned, forces = _outward(poses[1:], loads)
         local = (_transposed(Ad) @ outward[..., None])[..., 0]

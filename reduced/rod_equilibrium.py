@@ -93,19 +93,20 @@ def refine(rod, vectors, tolerance):
     """
     lengths, turn = rod.lengths, np.linalg.norm(rod.free_strains.k, axis=1)
     size = np.minimum(lengths.sum() / FIRST_ELEMENTS, FIRST_TURN / np.maximum(turn, 1e-12))
-    coarse, iterations, load_steps, error = None, 0, 0, np.inf
+    before, iterations, load_steps, error = None, 0, 0, np.inf
     for halvings in range(HALVINGS + 1):
         # powers of two, so that every node remains one
         counts = 2 ** np.maximum(np.ceil(np.log2(lengths * 2**halvings / size) - 1e-9), 0).astype(int)
         grid = Grid(rod, counts, vectors)
-        x = None if coarse is None else grid.newton(grid.from_coarser(coarse, x_coarse), 1.0, tolerance)
+        x = grid.newton(grid.from_coarser(*before[:2]), 1.0, tolerance) if before else None
         x = grid.follow(tolerance) if x is None else x
         poses = grid.elements.poses(x)
         iterations, load_steps = iterations + grid.iterations, load_steps + grid.load_steps
-        if coarse is not None:
+        if before:
+            coarse, _, coarse_poses = before
             kept = np.concatenate([[0], np.cumsum(np.repeat(counts // coarse.counts, coarse.counts))])
-            error = float(np.linalg.norm(poses[kept, :3, 3] - poses_coarse[:, :3, 3], axis=1).max() / 3)
+            error = float(np.linalg.norm(poses[kept, :3, 3] - coarse_poses[:, :3, 3], axis=1).max() / 3)
             if error <= tolerance * lengths.sum():
                 return grid.s, poses, grid.elements.wrenches(x), error, iterations, load_steps
-        coarse, x_coarse, poses_coarse = grid, x, poses
+        before = grid, x, poses
     raise ConvergenceError(f"rod: {len(x)} elements leave an error of {error:.2g} mm: ask for a larger tolerance")

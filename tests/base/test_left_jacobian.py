@@ -18,6 +18,7 @@ def test_left_jacobian_and_its_slope_by_differences(turn):
     twist, wrench, step = RNG.standard_normal(6), RNG.standard_normal(6), 1e-6
     twist[:3] *= turn / np.linalg.norm(twist[:3])
     J, slope = LeftJacobian(twist[None]), np.empty((6, 6))
+    np.testing.assert_allclose(J.pose[0], se3.exp_pose(twist), atol=1e-12)
     for i, d in enumerate(step * np.eye(6)):
         moved = (se3.exp_pose(twist + d) - se3.exp_pose(twist - d)) / (2 * step) @ se3.inverse_pose(se3.exp_pose(twist))
         np.testing.assert_allclose(J.matrix[0, :, i], twist_of(moved), atol=2e-9)

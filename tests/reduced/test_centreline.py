@@ -6,7 +6,7 @@ import pytest
 from base import se3
 from base.errors import InputError
 from base.strains import RodStrains
-from reduced.centreline import centreline
+from reduced.centreline import centreline, free_shapes
 
 
 def test_bending_is_a_circle_towards_minus_z():
@@ -60,6 +60,19 @@ def test_sampling_does_not_depend_on_the_spacing_and_moves_with_the_base():
     fine = centreline([30.0, 20.0], strains, spacing=0.3, base_pose=base)
     np.testing.assert_allclose(fine.at(s), base @ coarse.at(s), atol=1e-10)
     assert fine.length == pytest.approx(coarse.length) == pytest.approx(30 * np.hypot(1.1, 0.02) + 20)
+
+
+def test_many_designs_at_once_are_those_one_by_one():
+    rng = np.random.default_rng(4)
+    lengths = rng.uniform(5, 40, (7, 3))
+    strains = RodStrains([1, 0, 0] + 0.05 * rng.standard_normal((7, 3, 3)), 0.03 * rng.standard_normal((7, 3, 3)))
+    base = se3.exp_pose(rng.standard_normal((7, 6)))
+    s, poses = free_shapes(lengths, strains, 5, base)
+    for i in range(7):
+        one = centreline(lengths[i], RodStrains(strains.e[i], strains.k[i]), 1.0, base[i])
+        np.testing.assert_allclose(poses[i], one.at(s[i]), atol=1e-10)
+    with pytest.raises(InputError, match=r"strains: give e and k of shape \(2, 3, 3\)"):
+        free_shapes(lengths[:2], strains)
 
 
 def test_bad_input_names_the_argument():

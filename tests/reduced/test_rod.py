@@ -223,6 +223,18 @@ class TestOfAManipulator:
         assert bend[np.isin(owner, (1, 4))] == pytest.approx(4 / 80, rel=1e-4)
         assert (bend[~np.isin(owner, (1, 4))] < 2 / 80).all()
 
+    def test_lines_along_the_bottom_of_slanted_segments_go_straight_into_their_ends(self):
+        strains = np.array([1.02, -0.015, 0.0, 0.013, 0.014, 0.0])
+        rod = Rod.of(Manipulator((CASES["one_sided_w10"](angle=60.0, chambers=3),)), law(strains), 0.02)
+        bottom = np.array([0.0, 0.0, -3.0])
+        for joint, beyond in ((rod.lengths[0], 0.0), (rod.lengths[:2].sum(), rod.lengths.sum())):
+            active, end = rod.free().at([joint, beyond])
+            slope = active[:3, :3] @ (strains[:3] + np.cross(strains[3:], bottom))
+            along = end[:3, :3].T @ slope
+            assert abs(along[1]) < 0.03 * 0.04 < abs(strains[3] * 3.0)
+        straight = Rod.of(self.body, self.laws, 0.02)
+        assert (straight.free_strains.k[[0, 2, 3, 5]] == 0).all()
+
     def test_weight_is_the_bodys(self):
         """one-sided-w10 at 90 degrees, one pitch: core 250 + block 160 - channel 20 - cavity 64 = 326 mm3; bare core 46 mm2."""
         rod = Rod.of(Manipulator(self.body.segments[1:]), self.laws[1], 0.02)
@@ -264,8 +276,8 @@ def test_quadratic_law_has_consistent_derivatives_and_shapes():
     q, P = HELICAL + 0.01 * rng.standard_normal((4, 6)), np.array([0.0, 0.01, 0.03, 0.05])
     assert states.psi(q, P).shape == (4,) and states.force(q, P).shape == (4, 6) and states.stiffness(q, P).shape == (4, 6, 6)
     for i, d in enumerate(step * np.eye(6)):
-        np.testing.assert_allclose(states.force(q, P)[:, i], (states.psi(q + d, P) - states.psi(q - d, P)) / (2 * step), atol=1e-7)
-        np.testing.assert_allclose(states.stiffness(q, P)[..., i], (states.force(q + d, P) - states.force(q - d, P)) / (2 * step), atol=1e-6)
+        for value, slope in ((states.psi, states.force(q, P)[:, i]), (states.force, states.stiffness(q, P)[..., i])):
+            np.testing.assert_allclose(slope, (value(q + d, P) - value(q - d, P)) / (2 * step), atol=1e-6)
     np.testing.assert_allclose(states.free_strains(P)[1], (REST + HELICAL) / 2)
     np.testing.assert_allclose(states.force(states.free_strains(P), P), 0.0, atol=1e-12)
     np.testing.assert_allclose(states.stiffness(q, 0.02), np.broadcast_to(COUPLED, (4, 6, 6)))
