@@ -64,6 +64,12 @@ class QuadraticLaw:
             [(s.stiffness + s.stiffness.T) / 2 for s in states],
         )
 
+    @property
+    def mirrored(self):
+        """The law of the mirror image at the plane y = 0 (Segment.mirrored)."""
+        sign = np.array([1, -1, 1, -1, 1, -1])
+        return QuadraticLaw(self.pressures, self.strains * sign, self.stiffnesses * np.outer(sign, sign))
+
     def _at(self, P):
         """(q0 (..., 6), K (..., 6, 6)) at P."""
         return self._interpolated(P) if np.ndim(P) else self._known(P)

@@ -235,6 +235,14 @@ class TestOfAManipulator:
         straight = Rod.of(self.body, self.laws, 0.02)
         assert (straight.free_strains.k[[0, 2, 3, 5]] == 0).all()
 
+    def test_a_mirrored_body_takes_the_mirrored_shape(self):
+        body = Manipulator((CASES["one_sided_w10"](angle=60.0, chambers=4),))
+        own = law(HELICAL, COUPLED)
+        tip = Rod.of(body, own, 0.02).equilibrium(DeadLoads((3e3, 5e3, -9e3))).tip
+        image = Rod.of(body.mirrored, own.mirrored, 0.02).equilibrium(DeadLoads((3e3, -5e3, -9e3))).tip
+        flip = np.diag([1, -1, 1, 1])
+        np.testing.assert_allclose(image, flip @ tip @ flip, atol=1e-8)
+
     def test_weight_is_the_bodys(self):
         """one-sided-w10 at 90 degrees, one pitch: core 250 + block 160 - channel 20 - cavity 64 = 326 mm3; bare core 46 mm2."""
         rod = Rod.of(Manipulator(self.body.segments[1:]), self.laws[1], 0.02)
