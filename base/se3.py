@@ -79,8 +79,16 @@ def screw_coefficients(rate, s=1.0):
 def exp_pose(twist):
     """Poses (..., 4, 4) of twists (..., 6) = (rotation vector, translation part)."""
     twist = np.asarray(twist, float)
-    coefficients = screw_coefficients(np.linalg.norm(twist[..., :3], axis=-1))
-    return np.einsum("...a,...aij->...ij", coefficients, screw_basis(twist))
+    w, v = twist[..., :3], twist[..., 3:]
+    W, rate = hat(w), np.linalg.norm(w, axis=-1)
+    WW = W @ W
+    a, b = _coefficients(rate)
+    c = screw_coefficients(rate)[..., 3, None, None]
+    out = np.zeros(twist.shape[:-1] + (4, 4))
+    out[..., :3, :3] = np.eye(3) + a * W + b * WW
+    out[..., :3, 3] = ((np.eye(3) + b * W + c * WW) @ v[..., None])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
 
 
 def log_pose(pose):

@@ -11,6 +11,8 @@ LARGEST_TURN, LARGEST_STRAIN = 2.0, 0.3
 SMALLEST_LOAD_STEP = 1 / 2048
 #: the coarsest elements: shares of the rod's length that turn less than this (rad) in the free state; and how often they are halved
 FIRST_ELEMENTS, FIRST_TURN, HALVINGS = 16, 0.4, 8
+#: rad, an element's turn beyond which finer ones are needed; so often are finer ones tried where no equilibrium is found
+LARGEST_ELEMENT_TURN, RETRIES = 3.0, 3
 
 
 class Grid:
@@ -61,6 +63,8 @@ class Grid:
                 return None
             k, e = np.linalg.norm(step[:, :3], axis=1), abs(step[:, 3:]).max()
             x = x + step / max(1.0, k @ h / LARGEST_TURN, e / LARGEST_STRAIN)
+            if (np.linalg.norm(x[:, :3], axis=1) * h).max() > LARGEST_ELEMENT_TURN:
+                return None
             if max(k.max() * reach, e) < small:
                 return x if not loads.conservative or is_minimum(tangent) else None
         return None
@@ -99,7 +103,13 @@ def refine(rod, vectors, tolerance):
         counts = 2 ** np.maximum(np.ceil(np.log2(lengths * 2**halvings / size) - 1e-9), 0).astype(int)
         grid = Grid(rod, counts, vectors)
         x = grid.newton(grid.from_coarser(*before[:2]), 1.0, tolerance) if before else None
-        x = grid.follow(tolerance) if x is None else x
+        try:
+            x = grid.follow(tolerance) if x is None else x
+        except ConvergenceError:
+            if halvings == RETRIES:
+                raise
+            before = None
+            continue
         poses = grid.elements.poses(x)
         iterations, load_steps = iterations + grid.iterations, load_steps + grid.load_steps
         if before:

@@ -111,6 +111,15 @@ def test_a_tip_moment_winds_a_straight_rod_into_a_helix():
     np.testing.assert_allclose(tip[:3, 0], helix[:3, 0], atol=1e-5)
 
 
+def test_a_rod_wound_up_many_times_needs_finer_elements_and_gets_them():
+    length, EI, moment = 100.0, 90.0, 70.0
+    rod = uniform(length, REST, np.diag([40.0, 15.0, 15.0, 60.0, EI, EI]))
+    state = rod.equilibrium(DeadLoads(tip_moment=(0.0, moment, 0.0)))
+    ring = se3.exp_pose([0.0, length * moment / EI, 0.0, length, 0.0, 0.0])
+    assert length * moment / EI > 12 * 2 * np.pi
+    np.testing.assert_allclose(state.tip, ring, atol=1e-3)
+
+
 def test_turning_base_and_loads_turns_the_answer():
     motion = se3.exp_pose([0.7, -1.1, 0.4, 10.0, -20.0, 5.0])
     loads = DeadLoads(GRAVITY, FORCE, MOMENT)
