@@ -79,17 +79,20 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
         raise InputError(f"strains: give e and k of shape ({lengths.size}, 3), one row for every piece")
     if not spacing > 0:
         raise InputError(f"spacing = {spacing:g} mm must be larger than 0")
-    rate, basis, joints = _joints(lengths, strains, base_pose)
+    m, basis, rate = lengths.size, se3.screw_basis(strains.twist_vector), np.linalg.norm(strains.k, axis=-1)
     counts = np.maximum(np.ceil(lengths / spacing - 1e-9).astype(int), 1)
-    starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    first = np.cumsum(counts) - counts
-    piece = np.repeat(np.arange(lengths.size), counts)
-    within = (np.arange(piece.size) - first[piece]) * (lengths / counts)[piece]
-    moved = (joints[:-1, None] @ basis).reshape(-1, 4, 16)
-    poses = np.empty((piece.size + 1, 4, 4))
-    np.matmul(se3.screw_coefficients(rate[piece], within)[:, None], moved[piece], out=poses[:-1].reshape(-1, 1, 16))
+    ends, last = np.cumsum(lengths), np.cumsum(counts)
+    piece = np.repeat(np.arange(m), counts)
+    within = (np.arange(piece.size) - (last - counts)[piece]) * (lengths / counts)[piece]
+    # of the whole pieces, then of the samples in them
+    coefficients = se3.screw_coefficients(np.concatenate([rate, rate[piece]]), np.concatenate([lengths, within]))
+    joints = _joints(coefficients[:m], basis, base_pose)
+    s, poses = np.empty(piece.size + 1), np.empty((piece.size + 1, 4, 4))
+    s[:-1], s[-1] = (ends - lengths)[piece] + within, ends[-1]
+    moved = (joints[:-1, None] @ basis).reshape(m, 4, 16)[piece]
+    np.matmul(coefficients[m:, None], moved, out=poses[:-1].reshape(-1, 1, 16))
     poses[-1] = joints[-1]
-    return Centreline(np.append(starts[piece] + within, starts[-1]), poses)
+    return Centreline(s, poses)
 
 
 def free_shapes(lengths, strains, samples=20, base_pose=None):
@@ -106,7 +109,8 @@ def free_shapes(lengths, strains, samples=20, base_pose=None):
     if samples < 1:
         raise InputError(f"samples = {samples}: give at least 1 for every piece")
     n, m = lengths.shape
-    rate, basis, joints = _joints(lengths, strains, base_pose)
+    basis, rate = se3.screw_basis(strains.twist_vector), np.linalg.norm(strains.k, axis=-1)
+    joints = _joints(se3.screw_coefficients(rate, lengths), basis, base_pose)
     within = lengths[..., None] * np.arange(samples) / samples
     s, poses = np.empty((n, m * samples + 1)), np.empty((n, m * samples + 1, 4, 4))
     s[:, :-1] = (within + (np.cumsum(lengths, axis=1) - lengths)[..., None]).reshape(n, -1)
@@ -116,13 +120,11 @@ def free_shapes(lengths, strains, samples=20, base_pose=None):
     return s, poses
 
 
-def _joints(lengths, strains, base_pose):
-    """(|k| (..., m), screw bases (..., m, 4, 4, 4), poses of the joints (..., m + 1, 4, 4)) of pieces in a row."""
-    rate = np.linalg.norm(strains.k, axis=-1)
-    basis = se3.screw_basis(strains.twist_vector)
-    steps = np.einsum("...a,...aij->...ij", se3.screw_coefficients(rate, lengths), basis)
-    joints = np.empty((lengths.shape[-1] + 1, *lengths.shape[:-1], 4, 4))
+def _joints(coefficients, basis, base_pose):
+    """Poses of the joints (..., m + 1, 4, 4) of pieces in a row from their screws: coefficients (..., m, 4), basis (..., m, 4, 4, 4)."""
+    steps = np.moveaxis(np.einsum("...a,...aij->...ij", coefficients, basis), -3, 0)
+    joints = np.empty((len(steps) + 1, *steps.shape[1:]))
     joints[0] = np.eye(4) if base_pose is None else base_pose
-    for i, step in enumerate(np.moveaxis(steps, -3, 0)):
-        np.matmul(joints[i], step, out=joints[i + 1])
-    return rate, basis, np.moveaxis(joints, 0, -3)
+    for before, step, after in zip(joints, steps, joints[1:]):
+        np.matmul(before, step, out=after)
+    return np.moveaxis(joints, 0, -3)
