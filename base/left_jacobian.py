@@ -84,11 +84,15 @@ class LeftJacobian:
 
     def slope(self, wrench):
         """(n, 6, 6): derivative by the twist of J^T w, for constant wrenches (n, 6)."""
-        transposed, a, along = np.swapaxes(self._ad, 1, 2), self._a, 2 * self._along[:, None]
-        y, Y, out = wrench[:, :, None], 0.0, 0.0
+        transposed, a, n = np.swapaxes(self._ad, 1, 2), self._a, len(wrench)
+        y = np.empty((5, n, 6, 1))  # (ad^T)^i w
+        y[0] = wrench[:, :, None]
         for i in range(4):
-            # y = (ad^T)^i w and its derivative Y
-            Y = wrench_commutator(y[:, :, 0]) + (transposed @ Y if i else 0.0)
-            y = transposed @ y
-            out = out + a[i] * Y + (a[4 + i] * y) * along
-        return out
+            np.matmul(transposed, y[i], out=y[i + 1])
+        C = wrench_commutator(y[:4].reshape(-1, 6)).reshape(4, n, 6, 6)
+        # derivative of y[i + 1]: Y[i] = C(y[i]) + ad^T Y[i - 1]
+        Y, out = C[0], a[0] * C[0]
+        for i in range(1, 4):
+            Y = C[i] + transposed @ Y
+            out += a[i] * Y
+        return out + (a[4:] * y[1:]).sum(axis=0) * (2 * self._along[:, None])

@@ -40,15 +40,15 @@ class Grid:
 
     def from_coarser(self, coarse, x):
         """x (n, 6) of the grid `coarse` on this one: linear in between within each piece."""
-        out = []
-        for start, count, finer in zip(np.cumsum(coarse.counts) - coarse.counts, coarse.counts, self.counts):
-            own = x[start : start + count]
-            if finer == count:
-                out.append(own)
-                continue
-            slope = np.gradient(own, axis=0) if count > 1 else np.zeros_like(own)
-            out.append(np.stack([own - slope / 4, own + slope / 4], axis=1).reshape(-1, 6))
-        return np.concatenate(out)
+        first = np.repeat(np.cumsum(coarse.counts) - coarse.counts, coarse.counts)
+        last = first + np.repeat(coarse.counts, coarse.counts) - 1
+        i = np.arange(len(x))
+        left, right = np.maximum(i - 1, first), np.minimum(i + 1, last)
+        slope = (x[right] - x[left]) / np.maximum(right - left, 1)[:, None]
+        halves = np.repeat(self.counts // coarse.counts, coarse.counts)  # 1 or 2
+        parent = np.repeat(i, halves)
+        second = np.arange(len(parent)) - (np.cumsum(halves) - halves)[parent]
+        return x[parent] + ((halves[parent] - 1) * (second - 0.5) / 2)[:, None] * slope[parent]
 
     def newton(self, x, factor, small):
         """The equilibrium near x (n, 6) under `factor` of the loads, or None: not found, or (without moments) not stable.

@@ -72,7 +72,7 @@ class QuadraticLaw:
 
     def _at(self, P):
         """(q0 (..., 6), K (..., 6, 6)) at P."""
-        return self._interpolated(P) if np.ndim(P) else self._known(P)
+        return self._known(P) if isinstance(P, (int, float)) else self._interpolated(P)
 
     def _interpolated(self, P):
         p, q, K = self.pressures, self.strains, self.stiffnesses
