@@ -18,6 +18,9 @@ from reduced.rod_equilibrium import refine
 from reduced.section import active_mass, passive_mass
 from reduced.section_laws import passive_law
 
+#: what a law must have; see reduced.section_laws.RodLaw
+LAW = ("free_strains", "psi", "force", "stiffness")
+
 
 @dataclass(frozen=True)
 class Piece:
@@ -33,6 +36,8 @@ class Piece:
     def __post_init__(self):
         if not (np.isfinite(self.length) and self.length > 0):
             raise InputError(f"length_mm = {self.length:g}: a piece of a rod must be longer than 0")
+        if not all(callable(getattr(self.law, name, None)) for name in LAW):
+            raise InputError(f"law: {type(self.law).__name__} is no rod law, which has {', '.join(LAW)}")
         if not (np.isfinite(self.pressure) and self.pressure >= 0):
             raise InputError(f"pressure_kPa = {self.pressure * 1e3:g}: give a finite value >= 0")
         if not (np.isfinite(self.mass) and self.mass >= 0):
@@ -95,20 +100,22 @@ class Rod:
         """The Centreline without loads, sampled every `spacing` mm."""
         return centreline(self.lengths, self.free_strains, spacing, self.base_pose)
 
-    def equilibrium(self, loads=None, distributed=(0.0, 0.0, 0.0), tolerance=5e-4):
+    def equilibrium(self, loads=None, distributed=(0.0, 0.0, 0.0), tolerance=5e-4, first_load=1.0):
         """The RodState under `loads` (geometry.loading.DeadLoads, in the coordinates of base_pose) and `distributed` (3,), a force on
         the line in N per mm of undeformed length.
 
         tolerance: of the rod's length; elements are halved until the nodes' estimated error is below. ConvergenceError, with the
-        share of the loads that was reached, where no stable equilibrium follows (with a tip moment: no equilibrium).
+        share of the loads that was reached, where no stable equilibrium follows (with a tip moment: no equilibrium). first_load: the
+        share of the loads put on first; where several stable equilibria exist, a small one leads to that of slow loading.
         """
         loads = loads or DeadLoads()
-        if not tolerance > 0:
-            raise InputError(f"tolerance = {tolerance:g} must be larger than 0")
+        for name, value, low, high in (("tolerance", tolerance, 1e-9, 0.1), ("first_load", first_load, 1e-3, 1.0)):
+            if not low <= value <= high:
+                raise InputError(f"{name} = {value:g} must lie in {low:g}..{high:g}")
         vectors = [np.asarray(v, float) for v in (loads.gravity, loads.tip_force, loads.tip_moment, distributed)]
         if any(v.shape != (3,) or not np.isfinite(v).all() for v in vectors):
             raise InputError("loads: give three finite numbers each for gravity, tip_force, tip_moment and distributed")
-        s, poses, wrench, *effort = refine(self, vectors, tolerance)
+        s, poses, wrench, *effort = refine(self, vectors, tolerance, first_load)
         return RodState(Centreline(s, poses), wrench[:, 3:], wrench[:, :3], *effort)
 
 

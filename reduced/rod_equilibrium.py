@@ -69,9 +69,9 @@ class Grid:
                 return x if not loads.conservative or is_minimum(tangent) else None
         return None
 
-    def follow(self, small):
-        """The equilibrium reached from the free state, the loads growing as fast as Newton's method lets them."""
-        x, before, reached, step = self.elements.free(), None, 0.0, 1.0
+    def follow(self, small, step=1.0):
+        """The equilibrium reached from the free state, the loads growing, from a first `step` on, as fast as Newton's method lets them."""
+        x, before, reached = self.elements.free(), None, 0.0
         while reached < 1.0:
             aim = min(1.0, reached + step)
             guess = x if before is None else x + (x - before[0]) * (aim - reached) / (reached - before[1])
@@ -89,11 +89,11 @@ class Grid:
         return x
 
 
-def refine(rod, vectors, tolerance):
+def refine(rod, vectors, tolerance, first_load):
     """(s (n + 1,), poses (n + 1, 4, 4), wrenches (n, 6), error in mm, iterations, load steps) of a rod's equilibrium.
 
-    vectors: see Grid. tolerance: of the length. The error of constant strains is of second order, so an answer is three times
-    nearer to the limit than to that of elements twice as long.
+    vectors: see Grid. tolerance: of the length; first_load: share of the loads. The error of constant strains is of second order,
+    so an answer is three times nearer to the limit than to that of elements twice as long.
     """
     lengths, turn = rod.lengths, np.linalg.norm(rod.free_strains.k, axis=1)
     size = np.minimum(lengths.sum() / FIRST_ELEMENTS, FIRST_TURN / np.maximum(turn, 1e-12))
@@ -104,7 +104,7 @@ def refine(rod, vectors, tolerance):
         grid = Grid(rod, counts, vectors)
         x = grid.newton(grid.from_coarser(*before[:2]), 1.0, tolerance) if before else None
         try:
-            x = grid.follow(tolerance) if x is None else x
+            x = grid.follow(tolerance, first_load) if x is None else x
         except ConvergenceError:
             if halvings == RETRIES:
                 raise
