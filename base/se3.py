@@ -14,25 +14,26 @@ def hat(vector):
     """Skew matrices (..., 3, 3) of vectors (..., 3): hat(a) b = a x b."""
     v = np.asarray(vector, float)
     out = np.zeros(v.shape[:-1] + (3, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return out - np.swapaxes(out, -1, -2)
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = x, y, z
+    out[..., 1, 2], out[..., 2, 0], out[..., 0, 1] = -x, -y, -z
+    return out
 
 
 def _coefficients(angle):
-    """sin t/t, (1-cos t)/t^2, (t-sin t)/t^3 for angles t of any shape."""
+    """sin t/t, (1-cos t)/t^2 for angles t of any shape."""
     t2 = angle * angle
     small = angle < SMALL
     t = np.where(small, 1.0, angle)
     a = np.where(small, 1 - t2 / 6, np.sin(t) / t)
     b = np.where(small, 0.5 - t2 / 24, 2 * np.sin(t / 2) ** 2 / t**2)
-    c = np.where(small, 1 / 6 - t2 / 120, (t - np.sin(t)) / t**3)
-    return a[..., None, None], b[..., None, None], c[..., None, None]
+    return a[..., None, None], b[..., None, None]
 
 
 def exp_rotation(vector):
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
     W = hat(vector)
-    a, b, _ = _coefficients(np.linalg.norm(vector, axis=-1))
+    a, b = _coefficients(np.linalg.norm(vector, axis=-1))
     return np.eye(3) + a * W + b * W @ W
 
 
@@ -44,14 +45,46 @@ def log_rotation(rotation):
     return Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-2] + (3,))
 
 
+def hat_pose(twist):
+    """Matrices (..., 4, 4) of twists (..., 6), the exponents of their poses."""
+    twist = np.asarray(twist, float)
+    out = np.zeros(twist.shape[:-1] + (4, 4))
+    out[..., :3, :3], out[..., :3, 3] = hat(twist[..., :3]), twist[..., 3:]
+    return out
+
+
+def screw_basis(twist):
+    """(..., 4, 4, 4): the powers 0 to 3 of X = hat_pose(twist), which exp(s X) is a combination of, since X^4 = -|w|^2 X^2."""
+    out = np.empty(np.shape(twist)[:-1] + (4, 4, 4))
+    out[..., 0, :, :], out[..., 1, :, :] = np.eye(4), hat_pose(twist)
+    out[..., 2, :, :] = out[..., 1, :, :] @ out[..., 1, :, :]
+    out[..., 3, :, :] = out[..., 2, :, :] @ out[..., 1, :, :]
+    return out
+
+
+def screw_coefficients(rate, s=1.0):
+    """(..., 4) coefficients of `screw_basis` in exp(s X), for |w| = rate: 1, s, s^2 (1 - cos t)/t^2, s^3 (t - sin t)/t^3, t = s rate."""
+    t = s * rate
+    small = abs(t) < SMALL
+    ts = np.where(small, 1.0, t)
+    half, ratio = np.sin(ts / 2), s / ts
+    squared, t2 = ratio * ratio, t * t
+    out = np.empty(t.shape + (4,))
+    out[..., 0], out[..., 1] = 1.0, s
+    out[..., 2] = np.where(small, s * s * (0.5 - t2 / 24), 2 * half * half * squared)
+    out[..., 3] = np.where(small, s * s * s * (1 / 6 - t2 / 120), (ts - np.sin(ts)) * squared * ratio)
+    return out
+
+
 def exp_pose(twist):
     """Poses (..., 4, 4) of twists (..., 6) = (rotation vector, translation part)."""
     twist = np.asarray(twist, float)
     w, v = twist[..., :3], twist[..., 3:]
-    W = hat(w)
-    a, b, c = _coefficients(np.linalg.norm(w, axis=-1))
-    out = np.zeros(twist.shape[:-1] + (4, 4))
+    W, rate = hat(w), np.linalg.norm(w, axis=-1)
     WW = W @ W
+    a, b = _coefficients(rate)
+    c = screw_coefficients(rate)[..., 3, None, None]
+    out = np.zeros(twist.shape[:-1] + (4, 4))
     out[..., :3, :3] = np.eye(3) + a * W + b * WW
     out[..., :3, 3] = ((np.eye(3) + b * W + c * WW) @ v[..., None])[..., 0]
     out[..., 3, 3] = 1.0

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, contact, segments, speed, verification
+from benchmarks import cell, chain, contact, rod, segments, speed, verification
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"
@@ -25,6 +25,8 @@ PARTS = {
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "segments": (segments.against_segments, "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes"),
+    "rod": (rod.speed, "what free and loaded shapes of a rod of four segments cost; some seconds"),
+    "rod-fe": (rod.against_finite_elements, "rods with unit cells' laws against finite elements of three bodies; some 5 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by penalty; some 20 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
@@ -51,6 +53,14 @@ MEANING = {
     "cell_vs_9_segment_step_cost_ratio": "one-sided-w10, 60 deg, h = 2 mm, steps of 5 kPa: CPU s a step, cell over 9 chambers",
     "cell_vs_30_segment_step_cost_ratio": "the same over 30 chambers",
     "cell_vs_segment_strain_rel": "that cell at 1 mm against the middle of 9 chambers, 20 and 50 kPa: |d(e, k pitch)| / (|k| pitch)",
+    "rod_free_shape_us": "free shape of four segments (12 pieces) at some 200 points, strains given: best us a call",
+    "rod_free_batch_us": "the same for 1000 designs at once (205 points each): us a design",
+    "rod_gravity_ms": "that rod hanging under its weight, to 0.05 % of its length: best ms a call",
+    "rod_vs_fe_tip_rel_max": "rods with the unit cells' quadratic laws against FE, h = 1.5 mm, three bodies of 5 chambers, free at 20 and "
+    "50 kPa, hanging and pushed at 20: largest distance of the tips over the length",
+    "rod_vs_fe_rms_rel_max": "the same: largest RMS distance of the centrelines over the length",
+    "rod_vs_fe_tip_rel_max_without_ends": "the tips' distance with the end effects switched off",
+    "rod_vs_fe_rms_rel_max_without_ends": "the centrelines' distance with the end effects switched off",
     "sphere_max_rel_error": "inflated sphere: largest relative error of the inner radius at P/mu = 0.1 .. 0.8",
     "sphere_past_limit_rel_error": "the same under volume control through the limit point to a = 2.2: largest error of the pressure",
     "tube_max_rel_error": "tube held at its length: largest error of the inner radius at P/mu = 0.1 .. 0.6",

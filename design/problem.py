@@ -13,8 +13,8 @@ from base.errors import ConvergenceError, InputError
 from base.strains import RodStrains
 from design.curves import arc_lengths, evenly, nearest_points
 from design.lookup import active_length
+from reduced.centreline import centreline
 from reduced.clearance import gap_left
-from reduced.rod import centreline
 
 PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)

@@ -1,7 +1,21 @@
-"""What is fast: rod kinematics and the analytic laws that predict a manipulator's shape. numpy and scipy alone."""
+"""What is fast: the rod, free and under load, and the laws that predict a manipulator's shape. numpy and scipy alone."""
 
 from reduced.body import body_surface
+from reduced.centreline import Centreline, centreline, free_shapes
 from reduced.model import AnalyticModel, SegmentLaw, predict
-from reduced.rod import Centreline, centreline
+from reduced.rod import Piece, Rod
+from reduced.section_laws import QuadraticLaw, RodLaw
 
-__all__ = ["AnalyticModel", "Centreline", "SegmentLaw", "body_surface", "centreline", "predict"]
+__all__ = [
+    "AnalyticModel",
+    "Centreline",
+    "Piece",
+    "QuadraticLaw",
+    "Rod",
+    "RodLaw",
+    "SegmentLaw",
+    "body_surface",
+    "centreline",
+    "free_shapes",
+    "predict",
+]

@@ -8,8 +8,8 @@ import numpy as np
 from base.errors import InputError
 from base.strains import RodStrains
 from geometry.parameters import TWISTING
+from reduced.centreline import centreline
 from reduced.helical import HelicalCell
-from reduced.rod import centreline
 from reduced.section import equivalent_radii
 from reduced.twisting import TwistingTube
 

@@ -1,91 +1,147 @@
-"""Rod kinematics on SE(3): section frames along a rod whose strains are constant on each piece.
+"""A rod that carries load: equilibria of segments in a row under gravity, tip and distributed loads.
 
-The frame (origin c, rotation Q) obeys c' = Q e, Q' = Q hat(k) per undeformed length, so over a piece it moves by the
-closed-form screw exp(s (k, e)), and the pieces follow one another by products. Frames, not tangents, are continuous at
-joints; with the paper's words (Eqs 22-26) the product of the pieces' end rotations turns the next piece.
+Each piece has its own law, pressure and mass; section frames are continuous at joints. Newton's method on the energy of elements with
+constant strains (reduced.rod_elements) finds the equilibrium, in load steps where a whole step fails; elements are halved until the
+answer stands still (reduced.rod_equilibrium). Loads are dead: fixed in space.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from base import se3
 from base.errors import InputError
 from base.strains import RodStrains
+from geometry.loading import DeadLoads
+from geometry.parameters import ONE_SIDED
+from reduced.centreline import Centreline, centreline
+from reduced.rod_equilibrium import refine
+from reduced.section import active_mass, passive_mass
+from reduced.section_laws import passive_law
+
+#: what a law must have; see reduced.section_laws.RodLaw
+LAW = ("free_strains", "psi", "force", "stiffness")
 
 
 @dataclass(frozen=True)
-class Centreline:
-    """Section frames along a rod.
+class Piece:
+    """A run of equal sections. length in mm; law: reduced.section_laws.RodLaw; pressure in MPa; mass per undeformed length in
+    tonne/mm with its centre (y, z) in mm."""
 
-    s : (n,) increasing undeformed arc length from the base, mm; every joint is a sample.
-    poses : (n, 4, 4) section frames, mm. Between two samples the strains are constant.
+    length: float
+    law: object
+    pressure: float = 0.0
+    mass: float = 0.0
+    mass_centre: tuple = (0.0, 0.0)
+
+    def __post_init__(self):
+        if not (np.isfinite(self.length) and self.length > 0):
+            raise InputError(f"length_mm = {self.length:g}: a piece of a rod must be longer than 0")
+        if not all(callable(getattr(self.law, name, None)) for name in LAW):
+            raise InputError(f"law: {type(self.law).__name__} is no rod law, which has {', '.join(LAW)}")
+        if not (np.isfinite(self.pressure) and self.pressure >= 0):
+            raise InputError(f"pressure_kPa = {self.pressure * 1e3:g}: give a finite value >= 0")
+        if not (np.isfinite(self.mass) and self.mass >= 0):
+            raise InputError(f"mass = {self.mass:g} tonne/mm: give a finite value >= 0")
+
+
+@dataclass(frozen=True)
+class Rod:
+    """Pieces from base to tip; base_pose (4, 4): the clamp's frame in space, mm; tip_centre: (y, z) in mm of the tip's frame where
+    tip forces act."""
+
+    pieces: tuple
+    base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
+    tip_centre: tuple = (0.0, 0.0)
+
+    def __post_init__(self):
+        object.__setattr__(self, "pieces", tuple(self.pieces))
+        object.__setattr__(self, "base_pose", np.asarray(self.base_pose, float))
+        if not self.pieces:
+            raise InputError("pieces: a rod needs at least one")
+        if self.base_pose.shape != (4, 4) or abs(self.base_pose[:3, :3].T @ self.base_pose[:3, :3] - np.eye(3)).max() > 1e-6:
+            raise InputError("base_pose: give a (4, 4) pose with a rotation matrix")
+
+    @classmethod
+    def of(cls, manipulator, laws, pressure, base_pose=None, end_effects=True):
+        """The rod of a Manipulator. laws, pressure (MPa): one for all segments or one for each.
+
+        end_effects (docs/theory-reduced.md): every chamber counts with its whole pitch, half a gap at the ends included, and the
+        ends of slanted one-sided segments turn about z; False: active from outermost wall to outermost wall, ends straight.
+        """
+        n = len(manipulator.segments)
+        laws = list(laws) if isinstance(laws, (list, tuple)) else [laws] * n
+        pressures = np.broadcast_to(np.asarray(pressure, float), n) if np.shape(pressure) in ((), (n,)) else ()
+        if len(laws) != n or len(pressures) != n:
+            raise InputError(f"laws, pressure_kPa: give one for all or one for each of the {n} segments")
+        pieces, known = [], {}
+        for segment, law, P in zip(manipulator.segments, laws, map(float, pressures)):
+            reach = segment.gap / segment.sin / 2 if end_effects else 0.0
+            turn = end_turn(segment, law.free_strains(P)) if end_effects else 0.0
+            length, (mass, z) = segment.end_length - reach, passive_mass(segment)
+            bare = [known.setdefault((segment.key, t), passive_law(segment, t)) for t in (turn / length, -turn / length)]
+            before, behind = (Piece(length, own, 0.0, mass, (0.0, z)) for own in bare)
+            mass, z = active_mass(segment)
+            pieces += [before, Piece(segment.active_length + 2 * reach, law, P, mass, (0.0, z)), behind]
+        last = manipulator.segments[-1]
+        return cls(pieces, np.eye(4) if base_pose is None else base_pose, (0.0, (last.core_bottom + last.core_top) / 2))
+
+    @property
+    def lengths(self):
+        """(pieces,) undeformed, mm."""
+        return np.array([p.length for p in self.pieces])
+
+    @property
+    def free_strains(self):
+        """RodStrains (pieces, 3) without loads."""
+        q = np.array([p.law.free_strains(p.pressure) for p in self.pieces])
+        return RodStrains(q[:, :3], q[:, 3:])
+
+    def free(self, spacing=1.0):
+        """The Centreline without loads, sampled every `spacing` mm."""
+        return centreline(self.lengths, self.free_strains, spacing, self.base_pose)
+
+    def equilibrium(self, loads=None, distributed=(0.0, 0.0, 0.0), tolerance=5e-4, first_load=1.0):
+        """The RodState under `loads` (geometry.loading.DeadLoads, in the coordinates of base_pose) and `distributed` (3,), a force on
+        the line in N per mm of undeformed length.
+
+        tolerance: of the rod's length; elements are halved until the nodes' estimated error is below. ConvergenceError, with the
+        share of the loads that was reached, where no stable equilibrium follows (with a tip moment: no equilibrium). first_load: the
+        share of the loads put on first; where several stable equilibria exist, a small one leads to that of slow loading.
+        """
+        loads = loads or DeadLoads()
+        for name, value, low, high in (("tolerance", tolerance, 1e-9, 0.1), ("first_load", first_load, 1e-3, 1.0)):
+            if not low <= value <= high:
+                raise InputError(f"{name} = {value:g} must lie in {low:g}..{high:g}")
+        vectors = [np.asarray(v, float) for v in (loads.gravity, loads.tip_force, loads.tip_moment, distributed)]
+        if any(v.shape != (3,) or not np.isfinite(v).all() for v in vectors):
+            raise InputError("loads: give three finite numbers each for gravity, tip_force, tip_moment and distributed")
+        s, poses, wrench, *effort = refine(self, vectors, tolerance, first_load)
+        return RodState(Centreline(s, poses), wrench[:, 3:], wrench[:, :3], *effort)
+
+
+def end_turn(segment, free):
+    """Turn (rad) about z of the section frame from the bare base end to the active part with free strains (6,); at the tip end back.
+
+    A line at height z of the section runs at the slope e2 - k1 z to the frame's x axis. The bottom of a one-sided core carries no
+    chambers, and slanted ones do not shear it: the line along it goes on straight from the bare end. (Measured, not derived.)
     """
+    return float(free[3] * segment.core_bottom - free[1]) if segment.kind == ONE_SIDED else 0.0
 
-    s: np.ndarray
-    poses: np.ndarray
 
-    @property
-    def points(self):
-        """(n, 3) origins of the section frames, mm."""
-        return self.poses[:, :3, 3]
+@dataclass(frozen=True)
+class RodState:
+    """An equilibrium. line: Centreline of the elements' ends, exact in between; force (n, 3) in N and moment (n, 3) in N mm of the n
+    elements, in their section frames; error: estimate of how far the nodes are from where infinitely many elements put them, mm;
+    iterations, load_steps: what it took, all refinements together."""
 
-    @property
-    def strains(self):
-        """RodStrains of the n-1 intervals between samples."""
-        relative = se3.inverse_pose(self.poses[:-1]) @ self.poses[1:]
-        return RodStrains.from_relative_pose(relative, np.diff(self.s))
-
-    @property
-    def tangents(self):
-        """(n, 3) unit tangents of the line of origins; at a joint that of the piece which begins there."""
-        e = self.strains.e[self._interval(self.s)]
-        tangents = (self.poses[:, :3, :3] @ e[:, :, None])[:, :, 0]
-        return tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
+    line: Centreline
+    force: np.ndarray
+    moment: np.ndarray
+    error: float
+    iterations: int
+    load_steps: int
 
     @property
-    def arc_length(self):
-        """(n,) deformed arc length at the samples, mm."""
-        return np.concatenate([[0.0], np.cumsum(self.strains.stretch * np.diff(self.s))])
-
-    @property
-    def length(self):
-        """Deformed length, mm."""
-        return self.arc_length[-1]
-
-    def at(self, s):
-        """Section frames (n, 4, 4) at any undeformed arc lengths s (n,) in mm on the rod: exact, not interpolated."""
-        s = np.asarray(s, float)
-        reach = self.s[-1] - self.s[0]
-        if s.size and (s.min() < self.s[0] - 1e-9 * reach or s.max() > self.s[-1] + 1e-9 * reach):
-            raise InputError(f"s: give undeformed arc lengths on the rod, {self.s[0]:g}..{self.s[-1]:g} mm")
-        i = self._interval(s)
-        return self.poses[i] @ se3.exp_pose(self.strains.twist_vector[i] * (s - self.s[i])[:, None])
-
-    def _interval(self, s):
-        return np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
-
-
-def centreline(lengths, strains, spacing=1.0, base_pose=None):
-    """The Centreline of pieces in a row.
-
-    lengths : (m,) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (m, 3). spacing : largest
-    distance of samples, mm. base_pose : (4, 4) frame of the base, default the identity.
-    """
-    lengths = np.asarray(lengths, float)
-    if lengths.ndim != 1 or not lengths.size or not (lengths > 0).all():
-        raise InputError("lengths: give one length larger than 0 mm for every piece")
-    if strains.e.shape != (lengths.size, 3) or strains.k.shape != (lengths.size, 3):
-        raise InputError(f"strains: give e and k of shape ({lengths.size}, 3), one row for every piece")
-    if not spacing > 0:
-        raise InputError(f"spacing = {spacing:g} mm must be larger than 0")
-    twist = strains.twist_vector
-    joints = [np.eye(4) if base_pose is None else np.asarray(base_pose, float)]
-    for step in se3.exp_pose(twist * lengths[:, None]):
-        joints.append(joints[-1] @ step)
-    counts = np.maximum(np.ceil(lengths / spacing - 1e-9).astype(int), 1)
-    piece = np.repeat(np.arange(lengths.size), counts)
-    within = np.concatenate([np.arange(n) / n for n in counts]) * lengths[piece]
-    starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    poses = np.array(joints)[piece] @ se3.exp_pose(twist[piece] * within[:, None])
-    return Centreline(np.append(starts[piece] + within, starts[-1]), np.append(poses, joints[-1][None], axis=0))
+    def tip(self):
+        """(4, 4) frame of the tip."""
+        return self.line.poses[-1]

@@ -27,3 +27,37 @@ def equivalent_radii(segment):
     """
     empty = empty_area(segment)
     return float(np.sqrt(empty / np.pi)), float(np.sqrt((empty + occupied_area(segment)) / np.pi))
+
+
+def active_mass(segment):
+    """(mass per undeformed length in tonne/mm, z of its centre in mm) of chambers and core, averaged over a pitch."""
+    s = segment
+    share = s.chamber_thickness / s.sin / s.pitch
+    hollow = s.cavity_thickness / s.sin / s.pitch
+    parts = _core(s)
+    for side in s.sides:
+        blocks = [(share * s.width, s.core_top, s.chamber_top), (-hollow * s.cavity_width, s.cavity_floor, s.cavity_top)]
+        if s.cavity_floor < s.channel_height / 2:
+            blocks.append((hollow * s.channel_width, s.cavity_floor, s.channel_height / 2))
+        parts += [(w * s.material.density, *sorted((side * a, side * b))) for w, a, b in blocks]
+    return _mass(parts)
+
+
+def passive_mass(segment):
+    """The same of the bare core with its channel."""
+    return _mass(_core(segment))
+
+
+def _core(s):
+    density = s.material.density
+    parts = [(s.width * density, s.core_bottom, s.core_top), (-s.channel_width * density, -s.channel_height / 2, s.channel_height / 2)]
+    if s.layer_thickness:
+        parts.append((s.width * (s.layer_material.density - density), s.core_bottom, s.layer_top))
+    return parts
+
+
+def _mass(parts):
+    width, low, high = (np.array(a, float) for a in zip(*parts))
+    mass = width * (high - low)
+    total = float(mass.sum())
+    return total, float((mass * (low + high)).sum() / 2 / total) if total else 0.0

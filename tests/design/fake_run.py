@@ -9,8 +9,8 @@ from base.files import write_csv
 from base.strains import RodStrains
 from geometry.designfile import Design, body_tables, write_design
 from geometry.parameters import Manipulator, Segment
+from reduced.centreline import centreline
 from reduced.model import AnalyticModel, predict
-from reduced.rod import centreline
 
 FACTOR = 0.8
 POSE = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, -3.0], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
