@@ -54,8 +54,7 @@ class CellProblem:
         self.nodes = self.displacement_space.tabulate_dof_coordinates()
         self.strains = fem.Constant(mesh, PETSc.ScalarType(np.eye(6)[0]))
         self.pressure = fem.Constant(mesh, PETSc.ScalarType(0.0))
-        self._left = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
-        self._right = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
+        self._direction = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
         self._define_forms()
         self._reduce(rollers or {})
         self._define_gauge(gauge, centre)
@@ -90,12 +89,14 @@ class CellProblem:
             energies += ((self.medium.density(F, second, material.mu), dx(GAP)),)
             self._contact = compat.compile_form(ufl.derivative(energies[-1][0] * dx(GAP), self.state, v))
         residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
-        slope = sum(ufl.inner(ufl.diff(w, q), self._left) * d for w, d in energies)
-        curvature = sum(ufl.inner(ufl.diff(ufl.inner(ufl.diff(w, q), self._left), q), self._right) * d for w, d in energies)
+        t = ufl.TestFunction(compat.cell_vectors(mesh, 6))
+        along = [(ufl.inner(ufl.diff(w, q), self._direction), d) for w, d in energies]
+        slope = sum(ufl.inner(ufl.diff(w, q), t) * d for w, d in energies)
+        curvature = sum(ufl.inner(ufl.diff(a, q), t) * d for a, d in along)
         self._residual = compat.compile_form(residual)
         self._tangent = compat.compile_form(ufl.derivative(residual, self.state))
         self._slope = compat.compile_form(slope)
-        self._mixed = compat.compile_form(ufl.derivative(slope, self.state, v))
+        self._mixed = compat.compile_form(sum(ufl.derivative(a * d, self.state, v) for a, d in along))
         self._curvature = compat.compile_form(curvature)
         self._volume = compat.compile_form(J * air)
         self._matrix = fem.petsc.create_matrix(self._tangent)
@@ -172,11 +173,11 @@ class CellProblem:
 
     def residual(self):
         """(dPi/du,p (unknowns,), dPi/d(e,k) (6,)) at the current state, strains and pressure."""
-        slope = np.empty(6)
-        for i in range(6):
-            self._left.value[:] = np.eye(6)[i]
-            slope[i] = fem.assemble_scalar(self._slope)
-        return self._vector_of(self._residual), slope
+        return self._vector_of(self._residual), self._sums_of(self._slope)
+
+    def _sums_of(self, form):
+        """(6,) integrals of a form with one component for each of (e, k)."""
+        return fem.assemble_vector(form).array.reshape(-1, 6).sum(axis=0)
 
     def tangent(self):
         """(bordered matrix as CSR, d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6))."""
@@ -189,11 +190,8 @@ class CellProblem:
         matrix, n = self._bordered.filled(data), self.unknowns
         mixed, curvature = np.empty((n, 6)), np.empty((6, 6))
         for i in range(6):
-            self._left.value[:] = np.eye(6)[i]
-            mixed[:, i] = self._vector_of(self._mixed)
-            for j in range(i + 1):
-                self._right.value[:] = np.eye(6)[j]
-                curvature[i, j] = curvature[j, i] = fem.assemble_scalar(self._curvature)
+            self._direction.value[:] = np.eye(6)[i]
+            mixed[:, i], curvature[:, i] = self._vector_of(self._mixed), self._sums_of(self._curvature)
         return matrix, mixed, curvature
 
     def contact_forces(self):

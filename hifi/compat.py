@@ -48,6 +48,14 @@ def mixed_space(mesh, degree=2):
 
 
 @quiet_compiler()
+def cell_vectors(mesh, size):
+    """Space of one vector of `size` numbers a cell: tested with it, a form with free components is assembled in one pass."""
+    if OLD:
+        return fem.VectorFunctionSpace(mesh, ("DG", 0), dim=size)
+    return fem.functionspace(mesh, ("DG", 0, (size,)))
+
+
+@quiet_compiler()
 def compile_form(form):
     """A compiled form with the project's compiler arguments."""
     return fem.form(form, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER}))
