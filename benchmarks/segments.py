@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.tables import table
+
 CHAMBERS = (9, 30)
 COST_MESH, COST_LEVELS, COST_PRESSURE = 2.0, 4, 0.02  # mm; equal steps to that pressure in MPa
 STRAIN_MESH, STRAIN_PRESSURE = 1.0, 0.05
@@ -103,3 +105,20 @@ def against_segments():
     figures["cell_vs_segment_strain_rel"] = max(errors)
     details = {"cost": {str(n): {"seconds_a_step": s, **facts} for n, (s, facts) in costs.items()}, "strains_e_k_pitch": rows, "dofs": dofs}
     return figures, details
+
+
+def section(details):
+    """Lines on cell and segments for docs/verification.md."""
+    names = ["e1", "e2", "e3", "k1 pitch", "k2 pitch", "k3 pitch"]
+    lines = ["", f"Strains at a mesh of {STRAIN_MESH:g} mm ({details['dofs']} dofs in the segment), where the middle is two pitches:", ""]
+    lines = ["## The unit cell and finite segments", *lines]
+    rows = []
+    for r in details["strains_e_k_pitch"]:
+        for key, text in (("cell", "cell"), ("middle_of_9", "middle of 9 chambers")):
+            rows.append([f"{r['pressure_kPa']:g}", text, *(f"{v:.4f}" for v in r[key])])
+        rows[-1].append(f"{r['difference_rel']:.2e}")
+        rows[-2].append("")
+    lines += table(["kPa", "body", *names, "difference over k pitch"], rows)
+    lines += ["", f"Cost of a step of {COST_PRESSURE / COST_LEVELS * 1e3:g} kPa at {COST_MESH:g} mm, processor seconds, same Newton:", ""]
+    costs = [[n, c["unknowns"], c["steps"], c["factorisations"], f"{c['seconds_a_step']:.2f}"] for n, c in details["cost"].items()]
+    return lines + table(["chambers", "unknowns", "steps", "factorisations", "s a step"], costs)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import cell, segments
 from benchmarks.tables import table
 
 ENERGY_INTERVALS = 16
@@ -157,6 +158,9 @@ def page(meta, folder):
     lines += table(["solution", "u, mm", "p, MPa"], [[name, f"{u:.1e}", f"{p:.1e}"] for name, (u, p) in d["patch"].items()])
     lines += ["", *ENERGY, ""]
     lines += table(["intervals", "work / energy - 1"], [[r["intervals"], f"{r['rel']:.2e}"] for r in d["energy"]["rules"]])
+    for part, section in (("cell", cell.section), ("segments", segments.section)):
+        if part in meta:
+            lines += ["", *section(meta[part]["details"])]
     return "\n".join(lines) + "\n"
 
 
