@@ -16,7 +16,7 @@ GRADED = (1.5, 1.225, 1.0)
 
 def case(mesh_size, levels=10, graded=False):
     from base.materials import NeoHookean
-    from hifi.cell_run import CellCase
+    from hifi.cellfile import CellCase
     from tests.cases import CASES
 
     segment = CASES["one_sided_w10"](angle=60.0, chambers=1, material=NeoHookean(0.2068))
@@ -34,7 +34,8 @@ def sweep(what, folder):
 
 def stiffness_difference(folder, mesh_size=2.0):
     """Largest |K d - (f(+) - f(-))/2| / |K d| over the six strains, in units of the stiffness's own scale."""
-    from hifi.cell_run import CellCase, solve_cell
+    from hifi.cell_run import solve_cell
+    from hifi.cellfile import CellCase
 
     segment, path = case(mesh_size).segment, Path(folder) / "fd.msh"
     free, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1, contact="none"), path)
@@ -86,7 +87,7 @@ def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
 
 def unit_cell():
     """The part `cell`: ({key: value}, details)."""
-    from hifi.cell_run import CellCase
+    from hifi.cellfile import CellCase
 
     default = CellCase.mesh_size
     with tempfile.TemporaryDirectory() as folder:

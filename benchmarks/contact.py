@@ -20,7 +20,8 @@ def segment(name="twist_w15", angle=60.0, mu=0.317):
 
 def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, medium=None):
     """(states, CPU seconds, path of the mesh, pressure of first touch or None)."""
-    from hifi.cell_run import CellCase, solve_cell
+    from hifi.cell_run import solve_cell
+    from hifi.cellfile import CellCase
 
     case = CellCase(body, pressure, size, levels, contact=contact)
     case = replace(case, medium=medium) if medium else case

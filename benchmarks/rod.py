@@ -81,7 +81,8 @@ def against_finite_elements():
     from geometry import Manipulator
     from geometry.loading import DeadLoads
     from geometry.mesh import mesh_manipulator
-    from hifi.cell_run import CellCase, solve_cell
+    from hifi.cell_run import solve_cell
+    from hifi.cellfile import CellCase
     from hifi.manipulator import ManipulatorSolve
     from reduced import QuadraticLaw, Rod
     from tests.cases import CASES

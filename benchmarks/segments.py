@@ -86,7 +86,8 @@ def middle(folder):
 
 def against_segments():
     """The part `segments`: ({key: value}, details)."""
-    from hifi.cell_run import CellCase, solve_cell
+    from hifi.cell_run import solve_cell
+    from hifi.cellfile import CellCase
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -12,8 +12,10 @@ from base.files import write_csv, write_text
 from base.tables import toml_text
 from geometry.designfile import design_from_tables, write_design
 from geometry.parameters import Manipulator
-from hifi.cell_run import KPA, cell_from_tables, solve_cell
+from hifi.cell_run import solve_cell
+from hifi.cellfile import cell_from_tables
 from hifi.manipulator_run import break_stretch, solve_design
+from hifi.results import KPA
 from hifi.study import LEVELS
 
 STRAINS = "e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm k_norm_per_mm k_dot_e_per_mm".split()

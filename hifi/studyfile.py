@@ -17,7 +17,7 @@ from base.tables import as_table, file_key, number, read_toml, refuse_unknown
 from geometry.designfile import design_from_tables, design_tables
 from geometry.parameters import Segment
 from hifi.cases import Case
-from hifi.cell_run import cell_from_tables, cell_tables
+from hifi.cellfile import cell_from_tables, cell_tables
 
 KINDS = ("cell", "segment", "manipulator")
 SEGMENT_KEYS = [file_key(f) for f in fields(Segment) if "unit" in f.metadata]

@@ -12,8 +12,9 @@ from base.materials import NeoHookean
 from geometry import cad
 from geometry.cell import mesh_cell
 from hifi.cell import CellProblem
-from hifi.cell_run import CellCase, run_cell, solve_cell
+from hifi.cell_run import run_cell, solve_cell
 from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
+from hifi.cellfile import CellCase
 from hifi.control import LoadControl
 from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath

@@ -7,7 +7,8 @@ from mpi4py import MPI
 from base.se3 import exp_rotation
 from geometry.cell import mesh_cell
 from hifi.cell import CellProblem
-from hifi.cell_run import CellCase, solve_cell
+from hifi.cell_run import solve_cell
+from hifi.cellfile import CellCase
 from hifi.contact import ThirdMedium
 from hifi.walls import CellWalls
 from tests.cases import CASES

@@ -5,7 +5,7 @@ import pytest
 from base.materials import silicone
 from base.tables import toml_text
 from geometry.designfile import design_from_tables
-from hifi.cell_run import CellCase, cell_from_tables, cell_tables
+from hifi.cellfile import CellCase, cell_from_tables, cell_tables
 from hifi.studyfile import read_study, value_of
 from tests.cases import CASES
 
