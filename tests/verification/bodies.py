@@ -63,7 +63,7 @@ def tube():
     return _octant(occ.cut([(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 2))], [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 1))])[0])
 
 
-def cylinder(layers=3):
+def cylinder(layers=4):
     """Solid cylinder of radius 1 and length 1 along x, its mesh the same on both ends."""
     occ = gmsh.model.occ
     disk = [(2, occ.addDisk(0, 0, 0, 1, 1))]
