@@ -114,6 +114,11 @@ def parser():
     c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the study; finished cases there are kept")
 
+    c = add("campaign", run_campaign, "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml")
+    c.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml")
+    c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the campaign; finished cases there are kept")
+
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
 
@@ -184,6 +189,12 @@ def run_study(a):
     from hifi.study import run_study as work
 
     work(a.study, a.output or Path("out") / a.study.stem, say=say, retry=a.retry)
+
+
+def run_campaign(a):
+    from hifi.campaign import run_campaign as work
+
+    work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry)
 
 
 def run_report(a):

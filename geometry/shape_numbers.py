@@ -1,0 +1,21 @@
+"""A cell's shape without a length: what strains times a length depend on when the material has only one modulus."""
+
+import numpy as np
+
+#: Segment's attributes in order: the angle in degrees, then lengths
+SHAPE = (
+    *("angle", "width", "chamber_height", "cavity_thickness", "wall", "gap", "top_wall", "side_wall"),
+    *("base_thickness", "roof", "channel_width", "channel_height", "cavity_floor"),
+)
+
+
+def normal_pitch(segment):
+    """Distance of neighbouring chambers across themselves, mm: the length by which all others are divided."""
+    return segment.chamber_thickness + segment.gap
+
+
+def shape_numbers(segment):
+    """(13,) the angle in degrees and the lengths of SHAPE in normal pitches."""
+    values = np.array([getattr(segment, name) for name in SHAPE])
+    values[1:] /= normal_pitch(segment)
+    return values
