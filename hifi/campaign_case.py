@@ -30,7 +30,7 @@ SCOUT_TOLERANCE = 1e-5
 #: of the volume at rest: first and largest step of the scout, and how far it goes
 FIRST, LARGEST, FURTHEST = 0.03, 0.5, 30.0
 #: a prescribed state is walked to in steps of at most this part of the way
-HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.02
+HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.1
 REST = np.eye(6)[0]
 
 

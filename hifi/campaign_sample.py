@@ -97,7 +97,7 @@ def _prescribed(point, place):
         return Prescribed(float(level), 2.0)
     direction = norm.ppf(np.clip(point[2:], 1e-6, 1 - 1e-6))
     direction /= np.linalg.norm(direction)
-    return Prescribed(float(level), float(0.5 + 1.5 * point[1]), tuple(direction.round(6).tolist()))
+    return Prescribed(float(level), float(0.4 + 1.1 * point[1]), tuple(direction.round(6).tolist()))
 
 
 def _sobol(dimension, count, seed):
