@@ -75,7 +75,7 @@ def _segment(kind, v):
         gap=v["gap_mm"],
         top_wall=outer,
         side_wall=outer,
-        base_thickness=v.get("base_thickness_mm", Segment.base_thickness),
+        base_thickness=v.get("base_thickness_mm", outer),  # a twisting segment has none
         roof=v.get("roof_mm", outer),
         channel_width=v["channel_width_mm"],
         channel_height=v["channel_height_mm"],
