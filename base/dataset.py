@@ -46,7 +46,7 @@ class CellData:
     first_touch: np.ndarray = column("cases", (), "f4", "P/mu at which walls touch; nan: not met or not looked for")
     cells: np.ndarray = column("cases", (), "i4", "tetrahedra")
     unknowns: np.ndarray = column("cases", (), "i4", "of the cell")
-    seconds: np.ndarray = column("cases", (), "f4", "that the case took")
+    seconds: np.ndarray = column("cases", (), "f4", "of CPU that the case took")
     missing: np.ndarray = column("cases", (), "i1", "prescribed states that were not reached")
     # ---- states
     case: np.ndarray = column("states", (), "i4", "row of its case")

@@ -126,7 +126,7 @@ def _case_row(campaign, design, record):
         **over_mu,
         "cells": mesh.get("cells", 0),
         "unknowns": mesh.get("unknowns", 0),
-        "seconds": record["seconds"],
+        "seconds": result.get("cpu_seconds", record["seconds"]),
         "missing": len(result.get("missing", [])),
     }
 

@@ -6,6 +6,7 @@ limit load nothing is recorded. Everything is in mm and MPa with mu = 1 MPa.
 """
 
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +43,7 @@ def solve_campaign_case(inputs, directory):
     """Case of hifi.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share", "prescribed"}.
 
     directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where there was none),
-    top pressure, and why prescribed states are missing. ConvergenceError when the free path ends before its top pressure.
+    top pressure, why prescribed states are missing, CPU time. ConvergenceError when the free path ends before its top pressure.
     """
     segment = segment_from_table(inputs["segment"], "segment", material_from_table(inputs["material"], "material"))
     path = directory / "cell.msh"
@@ -54,7 +55,7 @@ def solve_campaign_case(inputs, directory):
     levels = top * np.arange(inputs["levels"] + 1) / inputs["levels"]
     sampler.free(levels)
     missing = sampler.prescribed(inputs["prescribed"])
-    return {"mesh": mesh, "limit_pressure": limit, "top_pressure": top, "missing": missing}
+    return {"mesh": mesh, "limit_pressure": limit, "top_pressure": top, "missing": missing, "cpu_seconds": time.process_time()}
 
 
 class Sampler:

@@ -19,12 +19,20 @@ KEYS = ("kinds", "designs", "seed", "held_out_every", "levels", "top_pressure_ov
 
 @dataclass(frozen=True)
 class Mesh:
-    """mesh_size in mm; every: n-th designs, from the first, are computed on it; prescribed: states at prescribed strains of each."""
+    """mesh_size in mm; every: n-th designs, from the first, are computed on it.
+
+    prescribed: states at prescribed strains of every prescribed_every-th of those.
+    """
 
     name: str
     mesh_size: float
     every: int = 1
     prescribed: int = 0
+    prescribed_every: int = 1
+
+    def prescribed_of(self, index):
+        """How many prescribed states the design has."""
+        return self.prescribed if index // self.every % self.prescribed_every == 0 else 0
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,7 @@ def read_campaign(path):
         for index, segment in enumerate(bodies):
             for mesh in meshes:
                 if index % mesh.every == 0:
-                    case = _case(kind, index, mesh, segment, held[index][: mesh.prescribed], common)
+                    case = _case(kind, index, mesh, segment, held[index][: mesh.prescribed_of(index)], common)
                     designs.append(Design(kind, index, mesh, is_held_out(index, held_out_every), segment, case))
     designs.sort(key=lambda d: d.index)
     table = {"designs": count, "seed": seed, "held_out_every": held_out_every, **common}
@@ -119,16 +127,19 @@ def _meshes(rows, where):
     meshes = []
     for i, row in enumerate(rows, start=1):
         at = f"{where} [[mesh]] {i}"
-        refuse_unknown(row, ["name", "mesh_size_mm", "every", "prescribed"], at)
+        refuse_unknown(row, ["name", "mesh_size_mm", "every", "prescribed", "prescribed_every"], at)
         for key in ("name", "mesh_size_mm"):
             if key not in row:
                 raise InputError(f"{at}: key '{key}' is missing")
         size = number(row["mesh_size_mm"], "mesh_size_mm", at)
-        every, prescribed = (number(row.get(k, d), k, at, integer=True) for k, d in (("every", 1), ("prescribed", 0)))
-        for key, v, low, high in (("mesh_size_mm", size, 0.1, 20), ("every", every, 1, 10_000), ("prescribed", prescribed, 0, PLACES)):
-            if not low <= v <= high:
-                raise InputError(f"{at}: {key} = {v:g} must lie in {low:g}..{high:g}")
-        meshes.append(Mesh(str(row["name"]), float(size), every, prescribed))
+        counts = []
+        for key, default, low, high in (("every", 1, 1, 10_000), ("prescribed", 0, 0, PLACES), ("prescribed_every", 1, 1, 10_000)):
+            counts.append(number(row.get(key, default), key, at, integer=True))
+            if not low <= counts[-1] <= high:
+                raise InputError(f"{at}: {key} = {counts[-1]} must lie in {low}..{high}")
+        if not 0.1 <= size <= 20:
+            raise InputError(f"{at}: mesh_size_mm = {size:g} must lie in 0.1..20")
+        meshes.append(Mesh(str(row["name"]), float(size), *counts))
     if len({m.name for m in meshes}) < len(meshes):
         raise InputError(f"{where}: two [[mesh]] have the same name")
     return tuple(meshes)

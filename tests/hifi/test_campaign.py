@@ -27,6 +27,26 @@ def test_more_designs_keep_the_first_ones(tmp_path):
     assert [d.index for d in many.designs] == sorted(d.index for d in many.designs)  # ended half way it is a smaller one
 
 
+def test_prescribed_states_and_fine_meshes_are_for_some_designs(tmp_path):
+    text = """designs = 13
+kinds = ["twisting"]
+[[mesh]]
+name = "coarse"
+mesh_size_mm = 2
+prescribed = 2
+prescribed_every = 3
+[[mesh]]
+name = "fine"
+mesh_size_mm = 1
+every = 6
+"""
+    designs = campaign(tmp_path, text).designs
+    coarse, fine = ([d for d in designs if d.mesh.name == name] for name in ("coarse", "fine"))
+    assert [d.index for d in fine] == [0, 6, 12] and [d.index for d in coarse] == list(range(13))
+    assert [len(d.case.inputs["prescribed"]) for d in coarse] == [2, 0, 0] * 4 + [2]
+    assert not any(d.case.inputs["prescribed"] for d in fine)
+
+
 @pytest.mark.parametrize("kind", (ONE_SIDED, TWISTING))
 def test_designs_fill_their_ranges_evenly_and_all_can_be_built(kind):
     bodies = segments(kind, RANGES[kind], 64, 3)
