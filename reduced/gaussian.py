@@ -1,28 +1,31 @@
 """Gaussian processes: smooth functions of several inputs from few points, with their uncertainty.
 
-Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x')/scales|^2 / 2) + TREND (1 + t(x).t(x')) with
-trend functions t of the inputs, whose coefficients are hardly restricted, and noise on the observations. Scales and noise are
-shared by all outputs and maximise the likelihood (Rasmussen & Williams 2006, ch. 2 and 5), its variance profiled out.
+Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x')/scales|^2 / 2) + TREND (1 + x.x'), a smooth function
+and a plane whose coefficients are hardly restricted; and noise on the observations. Scales and noise are shared by the outputs
+and maximise the likelihood, with each output's variance profiled out (Rasmussen & Williams 2006, ch. 2 and 5). Many observations
+are summed up on `inducing` points of their own (deterministic training conditional, ch. 8.3), exactly when all of them are taken.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, cholesky, qr, solve_triangular
 from scipy.optimize import minimize
 
-#: prior variance of the trend's coefficients over that of the rest
+#: prior variance of the plane's coefficients over that of the smooth function
 TREND = 100.0
 LOG_NOISE = (np.log(1e-6), np.log(1e-1))
 LOG_SCALE = (np.log(0.3), np.log(100.0))
+JITTER = 1e-9
 
 
 @dataclass(frozen=True)
 class GaussianProcess:
-    """Means of p outputs at inputs of d numbers: `weights` on `points` (n, d), inputs shifted and scaled by `shift` and `width`.
+    """Means of p outputs at inputs of d numbers, which are shifted by `shift` and divided by `width` first.
 
-    scales (d,): lengths of the kernel in scaled inputs; trend (d + 1, p): constant and slopes; factor: Cholesky factor of
-    the observations' covariance; variance (p,) of each output's prior.
+    scales (d,): of the kernel, in those units; points (m, d): in units of the scales too; weights (m + 1 + d, p): of the kernels
+    at the points, the constant and the slopes. root (p, m + 1 + d, same) and kernel_root (m, m): triangular factors for the
+    deviation; variance (p,): each output's prior variance.
     """
 
     shift: np.ndarray
@@ -30,32 +33,34 @@ class GaussianProcess:
     scales: np.ndarray
     points: np.ndarray
     weights: np.ndarray
-    trend: np.ndarray
-    factor: np.ndarray
+    root: np.ndarray
+    kernel_root: np.ndarray
     variance: np.ndarray
     noise: float
 
     def __call__(self, x, derivative=False):
-        """(m, p) at inputs (m, d); with `derivative` also (m, p, d)."""
+        """(n, p) at inputs (n, d); with `derivative` also (n, p, d)."""
         z = (x - self.shift) / self.width
-        a = z / self.scales
-        kernel = _kernel(a, self.points)
-        mean = kernel @ self.weights + self.trend[0] + z @ self.trend[1:]
+        a, m = z / self.scales, len(self.points)
+        kernel, (smooth, constant, slopes) = _kernel(a, self.points), np.split(self.weights, [m, m + 1])
+        curved = kernel @ smooth
+        mean = curved + constant + z @ slopes
         if not derivative:
             return mean
-        n, p = self.weights.shape
         # d k(a, b)/d a = k (b - a)
-        first = kernel @ (self.weights[:, :, None] * self.points[:, None, :]).reshape(n, -1)
-        slope = first.reshape(len(x), p, -1) - (mean - self.trend[0] - z @ self.trend[1:])[:, :, None] * a[:, None, :]
-        return mean, (slope / self.scales + self.trend[1:].T) / self.width
+        p = smooth.shape[1]
+        first = kernel @ (smooth[:, :, None] * self.points[:, None, :]).reshape(m, -1)
+        slope = first.reshape(len(x), p, -1) - curved[:, :, None] * a[:, None, :]
+        return mean, (slope / self.scales + slopes.T) / self.width
 
     def deviation(self, x):
-        """(m, p) standard deviation of the outputs without noise."""
+        """(n, p) standard deviation of the outputs, without noise."""
         z = (x - self.shift) / self.width
-        mixed = _kernel(z / self.scales, self.points) + TREND * (1 + z @ (self.points * self.scales).T)
-        reduction = solve_triangular(self.factor, mixed.T, lower=True)
-        own = 1 + TREND * (1 + (z**2).sum(axis=1))
-        return np.sqrt(np.maximum(own - (reduction**2).sum(axis=0), 1e-12))[:, None] * np.sqrt(self.variance)
+        kernel = _kernel(z / self.scales, self.points)
+        basis = np.hstack([kernel, np.ones((len(x), 1)), z])
+        missed = 1 - (solve_triangular(self.kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
+        out = [self.noise * (solve_triangular(r, basis.T, trans="T") ** 2).sum(axis=0) + np.maximum(missed, 0) for r in self.root]
+        return np.sqrt(np.array(out).T * self.variance)
 
 
 def _kernel(a, b):
@@ -63,58 +68,82 @@ def _kernel(a, b):
     return np.exp(-0.5 * np.maximum(squares, 0))
 
 
-def fit(x, y, trust=None, most=600, seed=0):
-    """The GaussianProcess through y (n, p) at x (n, d). Its scales are found on at most `most` of the points.
+def fit(x, y, trust=None, most=500, inducing=700, seed=0):
+    """The GaussianProcess through y (n, p) at x (n, d).
 
-    trust (n,): the observations' noise is the noise over trust squared, for outputs that are quotients by something small.
+    trust (n, p): an observation's noise is the common one over its trust, for outputs that are quotients by something small.
+    Scales are found on at most `most` of the observations.
     """
-    trust = np.ones(len(x)) if trust is None else trust
+    trust = np.ones(y.shape) if trust is None else trust
     shift, width = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
-    z = (x - shift) / width
-    chosen = np.random.default_rng(seed).permutation(len(z))[:most] if len(z) > most else np.arange(len(z))
-    begin = np.append(np.full(z.shape[1], np.log(3.0)), np.log(1e-4))
+    z, order = (x - shift) / width, np.random.default_rng(seed).permutation(len(x))
+    some = order[:most]
+    groups = _alike(trust)
+    data = [(y[np.ix_(some, g)], trust[some, g[0]]) for g in groups]
+    centred = [(v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum(), t**-2) for v, t in data]
     found = minimize(
         _misfit,
-        begin,
-        (z[chosen], y[chosen] - y[chosen].mean(axis=0), trust[chosen] ** -2),
+        np.append(np.full(z.shape[1], np.log(3.0)), np.log(1e-4)),
+        (z[some], centred),
         jac=True,
         method="L-BFGS-B",
         bounds=[LOG_SCALE] * z.shape[1] + [LOG_NOISE],
-        options={"maxiter": 150},
+        options={"maxiter": 100},
     )
     scales, noise = np.exp(found.x[:-1]), float(np.exp(found.x[-1]))
-    return condition(x, y, trust, shift, width, scales, noise)
+    return _condition(z, y, trust, groups, order[:inducing], shift, width, scales, noise)
 
 
-def condition(x, y, trust, shift, width, scales, noise):
-    """The GaussianProcess with given scales through y (n, p) at x (n, d)."""
-    z = (x - shift) / width
-    mean = y.mean(axis=0)
-    covariance = _kernel(z / scales, z / scales) + TREND * (1 + z @ z.T) + noise * np.diag(trust**-2)
-    factor = cholesky(covariance, lower=True)
-    weights = cho_solve((factor, True), y - mean)
-    variance = ((y - mean) * weights).sum(axis=0) / len(z)
-    trend = TREND * np.vstack([weights.sum(axis=0), z.T @ weights])
-    trend[0] += mean
-    return GaussianProcess(shift, width, scales, z / scales, weights, trend, factor, variance, noise)
+def _alike(trust):
+    """Columns of equal trust, as lists."""
+    groups = {}
+    for j, column in enumerate(trust.T):
+        groups.setdefault(column.tobytes(), []).append(j)
+    return list(groups.values())
 
 
-def _misfit(log, z, y, doubt):
+def _condition(z, y, trust, groups, chosen, shift, width, scales, noise):
+    points, (d, p) = z[chosen] / scales, (z.shape[1], y.shape[1])
+    m = len(points)
+    basis = np.hstack([_kernel(z / scales, points), np.ones((len(z), 1)), z])
+    kernel_root = cholesky(_kernel(points, points) + JITTER * np.eye(m), lower=True)
+    prior = np.zeros((m + 1 + d, m + 1 + d))
+    prior[:m, :m], prior[m:, m:] = kernel_root.T, np.eye(1 + d) / np.sqrt(TREND)
+    weights, variance, roots = np.zeros((m + 1 + d, p)), np.zeros(p), [None] * p
+    for group in groups:
+        t = trust[:, group[0]][:, None]
+        shifted = (t**2 * y[:, group]).sum(axis=0) / (t**2).sum()
+        q, r = qr(np.vstack([t * basis, np.sqrt(noise) * prior]), mode="economic")
+        right = t * (y[:, group] - shifted)
+        w = solve_triangular(r, q[: len(z)].T @ right)
+        misfit = ((right - t * (basis @ w)) ** 2).sum(axis=0) / noise + ((prior @ w) ** 2).sum(axis=0)
+        variance[group] = misfit / len(z)
+        w[m] += shifted
+        weights[:, group] = w
+        for j in group:
+            roots[j] = r
+    return GaussianProcess(shift, width, scales, points, weights, np.array(roots), kernel_root, variance, noise)
+
+
+def _misfit(log, z, data):
     """Minus the log likelihood, each output's variance profiled out, and its gradient by the logarithms of scales and noise."""
-    n, p = y.shape
-    scales, noise = np.exp(log[:-1]), np.exp(log[-1])
+    n, scales, noise = len(z), np.exp(log[:-1]), np.exp(log[-1])
     a = z / scales
     kernel = _kernel(a, a)
-    try:
-        factor = cho_factor(kernel + TREND * (1 + z @ z.T) + noise * np.diag(doubt), lower=True)
-    except np.linalg.LinAlgError:
-        return 1e10, np.zeros(len(log))
-    weights = cho_solve(factor, y)
-    variance = (y * weights).sum(axis=0) / n
-    value = n / 2 * np.log(variance).sum() + p * np.log(np.diag(factor[0])).sum()
-    inverse = cho_solve(factor, np.eye(n))
-    outer = p / 2 * inverse - (weights / variance) @ weights.T / 2
-    s = outer * kernel
-    rows = s.sum(axis=1)
-    by_scale = 2 * (rows @ a**2 - (a * (s @ a)).sum(axis=0))
-    return value, np.append(by_scale, noise * np.diag(outer) @ doubt)
+    prior = kernel + TREND * (1 + z @ z.T)
+    value, outer_sum, by_noise = 0.0, np.zeros((n, n)), 0.0
+    for y, doubt in data:
+        p = y.shape[1]
+        try:
+            factor = cho_factor(prior + np.diag(noise * doubt), lower=True)
+        except np.linalg.LinAlgError:
+            return 1e10, np.zeros(len(log))
+        weights = cho_solve(factor, y)
+        variance = (y * weights).sum(axis=0) / n
+        value += n / 2 * np.log(variance).sum() + p * np.log(np.diag(factor[0])).sum()
+        outer = p / 2 * cho_solve(factor, np.eye(n)) - (weights / variance) @ weights.T / 2
+        outer_sum += outer
+        by_noise += noise * np.diag(outer) @ doubt
+    s = outer_sum * kernel
+    by_scale = 2 * (s.sum(axis=1) @ a**2 - (a * (s @ a)).sum(axis=0))
+    return value, np.append(by_scale, by_noise)
