@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from geometry.parameters import Segment
+
 #: Segment's attributes in order: the angle in degrees, then lengths
 SHAPE = (
     *("angle", "width", "chamber_height", "cavity_thickness", "wall", "gap", "top_wall", "side_wall"),
@@ -19,3 +21,9 @@ def shape_numbers(segment):
     values = np.array([getattr(segment, name) for name in SHAPE])
     values[1:] /= normal_pitch(segment)
     return values
+
+
+def segment_of(kind, shape, pitch, material):
+    """The Segment of one chamber with these shape numbers (13,) and normal pitch (mm)."""
+    lengths = dict(zip(SHAPE[1:], (shape[1:] * pitch).tolist()))
+    return Segment(kind, float(shape[0]), 1, **lengths, end_margin=1.0 + pitch, material=material)

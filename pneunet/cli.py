@@ -119,6 +119,13 @@ def parser():
     c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the campaign; finished cases there are kept")
 
+    c = add("train", run_train, "the rod law from a data set of cells, with its errors on held-out designs")
+    c.add_argument("data", type=Path, metavar="DATA.npz")
+    c.add_argument("--no-comparison", action="store_true", help="leave out the other laws and the learning curve")
+    c.add_argument(
+        "-o", "--output", type=Path, metavar="LAW.npz", help="default: law.npz beside the data; tables get the same name with .md"
+    )
+
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
 
@@ -195,6 +202,12 @@ def run_campaign(a):
     from hifi.campaign import run_campaign as work
 
     work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry)
+
+
+def run_train(a):
+    from reduced.training import run_training
+
+    run_training(a.data, a.output or a.data.with_name("law.npz"), say, compare=not a.no_comparison)
 
 
 def run_report(a):

@@ -24,8 +24,8 @@ class GaussianProcess:
     """Means of p outputs at inputs of d numbers, which are shifted by `shift` and divided by `width` first.
 
     scales (d,): of the kernel, in those units; points (m, d): in units of the scales too; weights (m + 1 + d, p): of the kernels
-    at the points, the constant and the slopes. root (p, m + 1 + d, same) and kernel_root (m, m): triangular factors for the
-    deviation; variance (p,): each output's prior variance.
+    at the points, the constant and the slopes. root (m + 1 + d, same) and kernel_root (m, m): triangular factors for the
+    deviation, as if every output were as noisy as the first; variance (p,): each output's prior variance.
     """
 
     shift: np.ndarray
@@ -59,8 +59,8 @@ class GaussianProcess:
         kernel = _kernel(z / self.scales, self.points)
         basis = np.hstack([kernel, np.ones((len(x), 1)), z])
         missed = 1 - (solve_triangular(self.kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
-        out = [self.noise * (solve_triangular(r, basis.T, trans="T") ** 2).sum(axis=0) + np.maximum(missed, 0) for r in self.root]
-        return np.sqrt(np.array(out).T * self.variance)
+        known = self.noise * (solve_triangular(self.root, basis.T, trans="T") ** 2).sum(axis=0)
+        return np.sqrt((known + np.maximum(missed, 0))[:, None] * self.variance)
 
 
 def _kernel(a, b):
@@ -68,8 +68,8 @@ def _kernel(a, b):
     return np.exp(-0.5 * np.maximum(squares, 0))
 
 
-def fit(x, y, trust=None, most=500, inducing=700, seed=0):
-    """The GaussianProcess through y (n, p) at x (n, d).
+def fit(x, y, trust=None, most=500, inducing=700, seed=0, like=None):
+    """The GaussianProcess through y (n, p) at x (n, d); `like`: another one whose scales and noise are taken as they are.
 
     trust (n, p): an observation's noise is the common one over its trust, for outputs that are quotients by something small.
     Scales are found on at most `most` of the observations.
@@ -77,6 +77,9 @@ def fit(x, y, trust=None, most=500, inducing=700, seed=0):
     trust = np.ones(y.shape) if trust is None else trust
     shift, width = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
     z, order = (x - shift) / width, np.random.default_rng(seed).permutation(len(x))
+    if like is not None:
+        shift, width = like.shift, like.width
+        return _condition((x - shift) / width, y, trust, _alike(trust), order[:inducing], shift, width, like.scales, like.noise)
     some = order[:most]
     groups = _alike(trust)
     data = [(y[np.ix_(some, g)], trust[some, g[0]]) for g in groups]
@@ -109,7 +112,7 @@ def _condition(z, y, trust, groups, chosen, shift, width, scales, noise):
     kernel_root = cholesky(_kernel(points, points) + JITTER * np.eye(m), lower=True)
     prior = np.zeros((m + 1 + d, m + 1 + d))
     prior[:m, :m], prior[m:, m:] = kernel_root.T, np.eye(1 + d) / np.sqrt(TREND)
-    weights, variance, roots = np.zeros((m + 1 + d, p)), np.zeros(p), [None] * p
+    weights, variance, roots = np.zeros((m + 1 + d, p)), np.zeros(p), []
     for group in groups:
         t = trust[:, group[0]][:, None]
         shifted = (t**2 * y[:, group]).sum(axis=0) / (t**2).sum()
@@ -120,9 +123,8 @@ def _condition(z, y, trust, groups, chosen, shift, width, scales, noise):
         variance[group] = misfit / len(z)
         w[m] += shifted
         weights[:, group] = w
-        for j in group:
-            roots[j] = r
-    return GaussianProcess(shift, width, scales, points, weights, np.array(roots), kernel_root, variance, noise)
+        roots.append(r)
+    return GaussianProcess(shift, width, scales, points, weights, roots[0], kernel_root, variance, noise)
 
 
 def _misfit(log, z, data):

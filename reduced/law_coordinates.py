@@ -65,6 +65,37 @@ class Coordinates:
         q[:, others] = learned[:, 1:] * odd(self.strain_parity[1:], cosine(shape)) * size[:, None]
         return q + REST
 
+    def spread(self, shape, pressure, learned, deviation):
+        """(n, 6) standard deviation of the strains from that of the learned numbers (n, p), taken as independent."""
+        lead, others = LEADING[self.kind]
+        size, out = np.exp(learned[:, 0]) * pressure, np.zeros((len(learned), 6))
+        out[:, lead] = size * deviation[:, 0]
+        c = np.abs(odd(self.strain_parity[1:], cosine(shape)))
+        out[:, others] = size[:, None] * c * np.hypot(deviation[:, 1:], learned[:, 1:] * deviation[:, :1])
+        return out
+
+    def strains_and_slopes(self, shape, pressure, learned, slopes):
+        """(strains (n, 6), their derivatives (n, 6, 14) by the shape numbers and P/mu) from those (n, p, d) of the learned."""
+        lead, others = LEADING[self.kind]
+        n, c = len(learned), cosine(shape)
+        by_angle = -np.radians(1.0) * np.sin(np.radians(shape[:, 0]))  # dc/d(degree)
+        columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
+        by = np.zeros((n, learned.shape[1], len(SHAPE) + 1))
+        by[:, :, 0] = slopes[:, :, 0] * (2 * c * by_angle)[:, None]
+        by[:, :, columns] = slopes[:, :, 1:-1] / shape[:, None, columns]
+        by[:, :, -1] = slopes[:, :, -1]
+        size = np.exp(learned[:, 0]) * pressure
+        by_size = size[:, None] * by[:, 0]
+        by_size[:, -1] += size / pressure
+        q, out = self.strains(shape, pressure, learned), np.zeros((n, 6, len(SHAPE) + 1))
+        out[:, lead] = by_size
+        for j, (i, parity) in enumerate(zip(others, self.strain_parity[1:]), start=1):
+            factor = c if parity < 0 else np.ones(n)
+            out[:, i] = (factor * size)[:, None] * by[:, j] + (factor * learned[:, j])[:, None] * by_size
+            if parity < 0:
+                out[:, i, 0] += by_angle * learned[:, j] * size
+        return q, out
+
     # ---- stiffness
     @property
     def stiffness_parity(self):

@@ -1,0 +1,303 @@
+"""`pneunet train`: the rod law from the data set of cells, and how well it does on designs that it has not seen.
+
+Three laws are compared for the free strains: the analytic models with one fitted factor for each strain, the regressor alone, and
+the regressor for what the analytic models leave. The law that is written is the regressor alone: the analytic cell costs
+milliseconds a state. Intervals come from the residuals of a cross-validation by design (conformal, with the Gaussian process's
+deviation as their shape); nothing of the held-out designs is used before the last table.
+"""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from base.dataset import read_dataset
+from base.errors import ConvergenceError, InputError
+from base.files import write_text
+from base.materials import NeoHookean
+from base.se3 import exp_pose
+from geometry.shape_numbers import segment_of
+from reduced import gaussian
+from reduced.law import KindLaw, RodLaw, write_law
+from reduced.law_coordinates import REST, Coordinates, cosine, odd
+from reduced.model import AnalyticModel
+from reduced.potential import fit_anharmonic, whitening
+
+FOLDS = 5
+INTERVAL = 0.9
+#: mm; of the free segment whose tip is compared
+TIP_LENGTH = 100.0
+#: mm; normal pitch of the segments that stand for shape numbers
+PITCH = 5.0
+#: parts of the training designs in the learning curve
+CURVE = (0.25, 0.5, 1.0)
+#: a deviation above this many times the largest one at the training points is outside
+DOUBT = 2.0
+
+
+@dataclass(frozen=True)
+class States:
+    """Rows of one kind on one mesh: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers, and
+    size (n,): norm of the free strains, rest taken off, at the design's top pressure."""
+
+    kind: str
+    shape: np.ndarray
+    pressure: np.ndarray
+    strains: np.ndarray
+    matrices: np.ndarray
+    design: np.ndarray
+    size: np.ndarray
+
+    def of(self, chosen):
+        return States(self.kind, *(getattr(self, n)[chosen] for n in ("shape", "pressure", "strains", "matrices", "design", "size")))
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """States at prescribed strains with their free state's: change (n, 6) of the strains, forces (n, 6)."""
+
+    free: States
+    change: np.ndarray
+    forces: np.ndarray
+
+
+def states_of(data, kind, held_out, mesh=0):
+    """(States of the accepted free states, rest included, Prescribed) of a kind, of the held-out designs or of all others."""
+    k = data.about["kinds"].index(kind)
+    cases = data.accepted & (data.kind == k) & (data.mesh == mesh) & (data.held_out == held_out)
+    rows = np.flatnonzero(cases[data.case])
+    free, held = rows[~data.prescribed[rows]], rows[data.prescribed[rows]]
+    top = {}
+    for i in free:  # pressures increase
+        top[data.case[i]] = np.linalg.norm(data.strains[i] - REST)
+    at = {(data.case[i], round(float(data.pressure[i]), 6)): n for n, i in enumerate(free)}
+    states = States(
+        kind,
+        *(a.astype(float) for a in (data.shape[data.case[free]], data.pressure[free], data.strains[free], data.matrices[free])),
+        data.design[data.case[free]],
+        np.array([top[data.case[i]] for i in free]),
+    )
+    where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)
+    change = data.strains[held].astype(float) - states.strains[where]
+    return states, Prescribed(states.of(where), change, data.forces[held].astype(float))
+
+
+# ---- fitting
+
+
+def fit_strains(states, like=None):
+    """GaussianProcess of the learned free strains."""
+    states = states.of(states.pressure > 0)
+    co = Coordinates(states.kind)
+    y = co.learned_strains(states.shape, states.pressure, states.strains)
+    trust = odd(co.strain_parity, np.abs(cosine(states.shape)))
+    return gaussian.fit(co.inputs(states.shape, states.pressure), y, trust, like=like)
+
+
+def fit_stiffness(states):
+    """GaussianProcess of the learned stiffness."""
+    co = Coordinates(states.kind)
+    y = co.learned_stiffness(states.shape, states.matrices)
+    good = np.isfinite(y).all(axis=1)
+    trust = odd(co.stiffness_parity, np.abs(cosine(states.shape)))
+    return gaussian.fit(co.inputs(states.shape, states.pressure)[good], y[good], trust[good])
+
+
+def fit_kind(states, prescribed):
+    """The KindLaw of training states."""
+    strains, stiffness = fit_strains(states), fit_stiffness(states)
+    f = prescribed.free
+    anharmonic = fit_anharmonic(states.kind, cosine(f.shape), _symmetric(f.matrices), prescribed.change, prescribed.forces)
+    x = Coordinates(states.kind).inputs(states.shape, states.pressure)
+    doubt = DOUBT * float(strains.deviation(x)[:, 0].max())
+    law = KindLaw(states.kind, strains, stiffness, anharmonic, np.ones(6), x.min(axis=0), x.max(axis=0), doubt)
+    quantile = _quantiles(law, states)
+    return KindLaw(**{**vars(law), "quantile": quantile})
+
+
+def _symmetric(K):
+    return (K + np.swapaxes(K, 1, 2)) / 2
+
+
+def _folds(states):
+    """(rows to train on, rows to test) by design."""
+    numbers = np.unique(states.design)
+    fold = np.random.default_rng(0).permutation(len(numbers)) % FOLDS
+    for f in range(FOLDS):
+        test = np.isin(states.design, numbers[fold == f])
+        yield ~test, test
+
+
+def _quantiles(law, states):
+    """(6,) what deviations are multiplied by for INTERVAL of the cross-validated residuals to lie within."""
+    states = states.of(states.pressure > 0)
+    scores = []
+    for train, test in _folds(states):
+        process = fit_strains(states.of(train), like=law.strains)
+        part = KindLaw(**{**vars(law), "strains": process})
+        t = states.of(test)
+        spread = part.spread(t.shape, t.pressure)
+        miss = np.abs(part.free_strains(t.shape, t.pressure) - t.strains)
+        scores.append(np.divide(miss, spread, out=np.zeros_like(miss), where=spread > 0))
+    return np.quantile(np.concatenate(scores), INTERVAL, axis=0)
+
+
+# ---- the analytic models
+
+
+def analytic_strains(states):
+    """(n, 6) strains of the analytic models at P > 0, nan beyond their limit loads."""
+    out, model, material = np.full(states.strains.shape, np.nan), AnalyticModel(), NeoHookean(mu=1.0)
+    scale = np.array([1, 1, 1, PITCH, PITCH, PITCH])
+    for number in np.unique(states.design):
+        rows = np.flatnonzero(states.design == number)
+        segment = segment_of(states.kind, states.shape[rows[0]], PITCH, material)
+        for last in range(len(rows), 0, -1):
+            try:
+                s = model.strains(segment, states.pressure[rows[:last]])
+            except (ConvergenceError, InputError):
+                continue
+            out[rows[:last]] = np.hstack([s.e, s.k]) * scale
+            break
+    return out
+
+
+def compare_laws(train, test):
+    """{name: (n,) errors on the test states} of the three laws; where the analytic model has no answer they are nan."""
+    train, test = train.of(train.pressure > 0), test.of(test.pressure > 0)
+    co = Coordinates(train.kind)
+    a_train, a_test = analytic_strains(train), analytic_strains(test)
+    known = np.isfinite(a_train).all(axis=1)
+    w = 1 / train.size[known, None]
+    a, q = (a_train[known] - REST) * w, (train.strains[known] - REST) * w
+    factor = (a * q).sum(axis=0) / np.maximum((a * a).sum(axis=0), 1e-30)
+    laws = {"calibrated analytic model": REST + factor * (a_test - REST)}
+    process = fit_strains(train)
+    laws["regressor"] = co.strains(test.shape, test.pressure, process(co.inputs(test.shape, test.pressure)))
+    laws["analytic model and regressor"] = _corrected(co, train, a_train, test, a_test)
+    return {name: strain_error(test, strains) for name, strains in laws.items()}
+
+
+def _corrected(co, train, a_train, test, a_test):
+    with np.errstate(invalid="ignore", divide="ignore"):
+        learned = [co.learned_strains(s.shape, s.pressure, a) for s, a in ((train, a_train), (test, a_test))]
+    y = co.learned_strains(train.shape, train.pressure, train.strains) - learned[0]
+    good = np.isfinite(y).all(axis=1)
+    trust = odd(co.strain_parity, np.abs(cosine(train.shape)))
+    process = gaussian.fit(co.inputs(train.shape, train.pressure)[good], y[good], trust[good])
+    return co.strains(test.shape, test.pressure, learned[1] + process(co.inputs(test.shape, test.pressure)))
+
+
+# ---- judging
+
+
+def strain_error(states, strains):
+    """(n,) norm of the error over the norm of the free strains at top pressure."""
+    return np.linalg.norm(strains - states.strains, axis=1) / states.size
+
+
+def tip_error(states, strains):
+    """(n,) distance of the tips of free segments of TIP_LENGTH, at normal pitch PITCH, over that length."""
+    scale = np.array([PITCH, PITCH, PITCH, 1, 1, 1]) ** -1.0
+    tips = [exp_pose(TIP_LENGTH * q[:, [3, 4, 5, 0, 1, 2]] * scale)[:, :3, 3] for q in (states.strains, strains)]
+    return np.linalg.norm(tips[1] - tips[0], axis=1) / TIP_LENGTH
+
+
+def stiffness_error(states, K):
+    """(n,) largest |1 - eigenvalue| of K_FE^-1 K."""
+    values = np.linalg.eigvals(np.linalg.solve(states.matrices, K)).real
+    return np.abs(values - 1).max(axis=1)
+
+
+def force_error(law, prescribed):
+    """(n,) norm of the force error over that of the force, whitened by the stiffness; law alone, its free states included."""
+    f = prescribed.free
+    free, K = law.free_strains(f.shape, f.pressure), law.free_stiffness(f.shape, f.pressure)
+    M, D1 = whitening(law.kind, K)
+    v = np.einsum("nij,nj->ni", M, f.strains + prescribed.change - free)
+    by_v = D1[:, None] * (v + law.anharmonic.gradient(v, cosine(f.shape)))
+    forces = np.einsum("nij,ni->nj", M, by_v)
+    own, _ = whitening(law.kind, _symmetric(f.matrices))
+    white = [np.linalg.solve(np.swapaxes(own, 1, 2), x[..., None])[..., 0] for x in (forces - prescribed.forces, prescribed.forces)]
+    return np.linalg.norm(white[0], axis=1) / np.linalg.norm(white[1], axis=1)
+
+
+def coverage(law, states):
+    """Share of the held-out strains that are not zero by symmetry within their 90 % intervals."""
+    states = states.of(states.pressure > 0)
+    half = law.half_width(states.shape, states.pressure)
+    inside = np.abs(law.free_strains(states.shape, states.pressure) - states.strains) <= half
+    return float(inside[:, law.quantile > 0].mean())
+
+
+def judge(law, states, prescribed):
+    """{figure: value} on held-out states."""
+    loaded = states.of(states.pressure > 0)
+    q = law.free_strains(loaded.shape, loaded.pressure)
+    strain, tip = strain_error(loaded, q), tip_error(loaded, q)
+    stiffness = stiffness_error(states, law.free_stiffness(states.shape, states.pressure))
+    figures = {
+        "law_strain_median_rel": np.median(strain),
+        "law_strain_p95_rel": np.percentile(strain, 95),
+        "law_tip100_p95_rel": np.percentile(tip, 95),
+        "law_stiffness_p95_rel": np.percentile(stiffness, 95),
+        "law_interval_coverage_90": coverage(law, loaded),
+    }
+    if len(prescribed.forces):
+        figures["law_force_p95_rel"] = np.percentile(force_error(law, prescribed), 95)
+    return {name: float(value) for name, value in figures.items()}
+
+
+def learning_curve(states, test):
+    """[(designs, median, 95th percentile)] of the free strains' error for parts of the training designs, the first ones."""
+    numbers, rows = np.unique(states.design), []
+    test = test.of(test.pressure > 0)
+    co = Coordinates(states.kind)
+    for part in CURVE:
+        some = states.of(np.isin(states.design, numbers[: max(8, round(part * len(numbers)))]))
+        process = fit_strains(some)
+        error = strain_error(test, co.strains(test.shape, test.pressure, process(co.inputs(test.shape, test.pressure))))
+        rows.append((len(np.unique(some.design)), float(np.median(error)), float(np.percentile(error, 95))))
+    return rows
+
+
+# ---- the command
+
+
+def run_training(path, out, say=print, compare=True):
+    """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables. Returns the RodLaw."""
+    data, started = read_dataset(path), time.perf_counter()
+    kinds, figures, lines = {}, {}, [f"# The trained law of {Path(path).name}", ""]
+    for kind in data.about["kinds"]:
+        (states, prescribed), (test, test_prescribed) = (states_of(data, kind, held_out) for held_out in (False, True))
+        designs, held = (len(np.unique(s.design)) for s in (states, test))
+        if designs < 2 * FOLDS or not held or not len(prescribed.forces):
+            raise InputError(f"{path}: {designs} accepted {kind} designs, {held} held out: too few to train on")
+        say(f"{kind}: {designs} designs to train on, {held} held out")
+        kinds[kind] = fit_kind(states, prescribed)
+        figures[kind] = judge(kinds[kind], test, test_prescribed)
+        lines += [f"## {kind}", "", f"{designs} designs to train on, {held} held out.", "", "| held-out figure | value |", "|---|---|"]
+        lines += [f"| {name} | {value:.4f} |" for name, value in figures[kind].items()]
+        if compare:
+            lines += ["", *_comparison(states, test)]
+        for line in lines[-20:]:
+            say(line)
+    law = RodLaw(kinds, {"data": Path(path).name, "figures": figures, "revisions": data.about["revisions"]})
+    write_law(out, law)
+    write_text(Path(out).with_suffix(".md"), "\n".join(lines) + "\n")
+    say(f"law in {out}, tables in {Path(out).with_suffix('.md')}; {time.perf_counter() - started:.0f} s")
+    return law
+
+
+def _comparison(states, test):
+    yield "| law of the free strains | median error | 95th percentile | without an answer |"
+    yield "|---|---|---|---|"
+    for name, error in compare_laws(states, test).items():
+        good = error[np.isfinite(error)]
+        yield f"| {name} | {np.median(good):.4f} | {np.percentile(good, 95):.4f} | {1 - len(good) / len(error):.1%} |"
+    yield ""
+    yield "| designs trained on | median error | 95th percentile |"
+    yield "|---|---|---|"
+    for designs, median, high in learning_curve(states, test):
+        yield f"| {designs} | {median:.4f} | {high:.4f} |"
