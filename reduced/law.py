@@ -7,6 +7,7 @@ free_strains(P), psi(q, P), force(q, P), stiffness(q, P). Everything else is wit
 
 import json
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 
@@ -102,7 +103,7 @@ class RodLaw:
         return RodStrains(q[..., :3], q[..., 3:])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SectionLaw:
     """The law of one Segment's section in mm, N and MPa; q (..., 6) = (e, k), P a number or (...,)."""
 
@@ -112,9 +113,14 @@ class SectionLaw:
     mu: float
     remarks: tuple = ()
 
-    @property
-    def _scale(self):
-        return np.array([1, 1, 1, self.length, self.length, self.length])
+    def __post_init__(self):
+        object.__setattr__(self, "_scale", np.array([1, 1, 1, self.length, self.length, self.length]))
+        object.__setattr__(self, "_known", lru_cache(maxsize=64)(self._free_state))
+
+    def _free_state(self, *pressures):
+        """(free strains (n, 6), M (n, 6, 6), D1 (n,)) without dimension at pressures in MPa."""
+        shape, p = self._rows(pressures)
+        return self.law.free_strains(shape, p), *whitening(self.law.kind, self.law.free_stiffness(shape, p))
 
     def _rows(self, P):
         p = np.atleast_1d(np.asarray(P, float)).ravel() / self.mu
@@ -137,13 +143,14 @@ class SectionLaw:
         """(shape of the answer, v (n, 6), M (n, 6, 6), D1 (n,), c (n,))."""
         lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(P))
         q = np.broadcast_to(q, (*lead, 6)).reshape(-1, 6)
-        pressures, back = np.unique(np.asarray(P, float), return_inverse=True)
-        shape, p = self._rows(pressures)
-        free, K = self.law.free_strains(shape, p), self.law.free_stiffness(shape, p)
-        M, D1 = whitening(self.law.kind, K)
-        i = np.broadcast_to(back.reshape(np.shape(P)), lead).ravel()
-        v = np.einsum("nij,nj->ni", M[i], q * self._scale - free[i])
-        return lead, v, M[i], D1[i], np.broadcast_to(cosine(self.shape[None]), len(q))
+        if np.ndim(P):
+            pressures, back = np.unique(np.asarray(P, float), return_inverse=True)
+            i = np.broadcast_to(back.reshape(np.shape(P)), lead).ravel()
+            free, M, D1 = (a[i] for a in self._free_state(*pressures))
+        else:
+            free, M, D1 = self._known(float(P))
+        v = (M @ (q * self._scale - free)[:, :, None])[:, :, 0]
+        return lead, v, M, D1, np.broadcast_to(cosine(self.shape[None]), len(q))
 
     def psi(self, q, P):
         """(...,) enthalpy per undeformed length, N; 0 at the free state."""
@@ -154,7 +161,7 @@ class SectionLaw:
         """(..., 6) gradient of psi: force (N) and moment (N mm) in the section frame."""
         lead, v, M, D1, c = self._state(q, P)
         by_v = D1[:, None] * (v + self.law.anharmonic.gradient(v, c))
-        force = np.einsum("nij,ni->nj", M, by_v)
+        force = (by_v[:, None, :] @ M)[:, 0]
         return (self.mu * self.length**2 * force * self._scale).reshape(*lead, 6)
 
     def stiffness(self, q, P):

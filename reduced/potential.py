@@ -7,14 +7,14 @@ out; those that are odd in the mirror image carry c = cos(angle). Without dimens
 """
 
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
 from reduced.law_coordinates import BLOCKS, MIRROR
 
 DEGREES = (3, 4)
-#: of the mean square of the regression's columns
+#: added to the normal equations of relative forces: keeps coefficients that nothing determines small
 RIDGE = 1e-4
 
 
@@ -40,50 +40,60 @@ def whitening(kind, K):
 
 @dataclass(frozen=True)
 class Anharmonic:
-    """coefficients (m,) of `monomials(kind)`, times cos(angle) where odd in the mirror; reach: largest |v| it was trained on."""
+    """coefficients (m,) of `monomials(kind)`, times cos(angle) where odd in the mirror; reach: largest |v| it was trained on.
+
+    Kept as symmetric tensors of the second derivatives: that of a form of degree n is its Hessian, twice contracted n (n - 1)
+    times its value.
+    """
 
     kind: str
     coefficients: np.ndarray
     reach: float
 
     def __post_init__(self):
-        listed = monomials(self.kind)
-        object.__setattr__(self, "powers", np.array([[m.count(i) for i in range(6)] for m in listed]))
-        object.__setattr__(self, "parity", np.array([np.prod(MIRROR[list(m)]) for m in listed]))
+        tensors = []
+        for parity in (1, -1):
+            cubic, quartic = np.zeros((6,) * 3), np.zeros((6,) * 4)
+            for m, value in zip(monomials(self.kind), self.coefficients):
+                if np.prod(MIRROR[list(m)]) == parity:
+                    orders = set(permutations(m))
+                    for order in orders:
+                        (cubic if len(m) == 3 else quartic)[order] = value / len(orders)
+            tensors.append((6 * cubic.reshape(6, 36), 12 * quartic.reshape(36, 36)))
+        object.__setattr__(self, "_tensors", tensors)
 
-    def coefficients_at(self, c):
-        """(n, m) at cos(angle) (n,)."""
-        return self.coefficients * np.where(self.parity < 0, np.asarray(c)[:, None], 1.0)
-
-    def terms(self, v, order):
-        """Monomials (n, m), their gradients (n, m, 6) or Hessians (n, m, 6, 6) at v (n, 6), by order 0, 1, 2."""
-        table = np.stack([v**k for k in range(max(DEGREES) + 1)], axis=1)  # (n, power, 6)
-        return _derivative(table, self.powers, order)
+    def _hessians(self, v, c):
+        """Hessians (n, 6, 6) of the cubic and of the quartic part."""
+        c = np.asarray(c)[:, None]
+        (cubic, quartic), (odd_cubic, odd_quartic) = self._tensors
+        squares = (v[:, :, None] * v[:, None, :]).reshape(-1, 36)
+        parts = v @ cubic + c * (v @ odd_cubic), squares @ quartic + c * (squares @ odd_quartic)
+        return [part.reshape(-1, 6, 6) for part in parts]
 
     def value(self, v, c):
-        return (self.coefficients_at(c) * self.terms(v, 0)).sum(axis=1)
+        """(n,) at v (n, 6) and cos(angle) (n,)."""
+        cubic, quartic = self._hessians(v, c)
+        return (v[:, None, :] @ (cubic / 6 + quartic / 12) @ v[:, :, None])[:, 0, 0]
 
     def gradient(self, v, c):
-        return np.einsum("nm,nmi->ni", self.coefficients_at(c), self.terms(v, 1))
+        """(n, 6)."""
+        cubic, quartic = self._hessians(v, c)
+        return ((cubic / 2 + quartic / 3) @ v[:, :, None])[:, :, 0]
 
     def hessian(self, v, c):
-        return np.einsum("nm,nmij->nij", self.coefficients_at(c), self.terms(v, 2))
+        """(n, 6, 6)."""
+        return sum(self._hessians(v, c))
 
 
-def _derivative(table, powers, order):
-    def product(powers, factor):
-        return factor * np.prod(table[:, np.maximum(powers, 0), np.arange(6)], axis=2)
-
-    if order == 0:
-        return product(powers, 1.0)
-    unit = np.eye(6, dtype=int)
-    if order == 1:
-        return np.stack([product(powers - unit[i], powers[:, i]) for i in range(6)], axis=2)
-    rows = []
-    for i in range(6):
-        once = powers - unit[i]
-        rows.append(np.stack([product(once - unit[j], powers[:, i] * once[:, j]) for j in range(6)], axis=2))
-    return np.stack(rows, axis=2)
+def _gradients(kind, v, c):
+    """(n, m, 6) gradients of the monomials, times cos(angle) where odd."""
+    listed = monomials(kind)
+    powers = np.array([[m.count(i) for i in range(6)] for m in listed])
+    parity = np.array([np.prod(MIRROR[list(m)]) for m in listed])
+    out = np.stack(
+        [powers[:, i] * np.prod(v[:, None, :] ** np.maximum(powers - np.eye(6, dtype=int)[i], 0), axis=2) for i in range(6)], axis=2
+    )
+    return out * np.where(parity < 0, c[:, None], 1.0)[:, :, None]
 
 
 def fit_anharmonic(kind, c, K, change, forces, ridge=RIDGE):
@@ -95,10 +105,9 @@ def fit_anharmonic(kind, c, K, change, forces, ridge=RIDGE):
     v = np.einsum("nij,nj->ni", M, change)
     wanted = np.linalg.solve(np.swapaxes(M, 1, 2), forces[..., None])[..., 0] / D1[:, None]
     size = np.linalg.norm(wanted, axis=1)[:, None]
-    empty = Anharmonic(kind, np.ones(len(monomials(kind))), float(np.linalg.norm(v, axis=1).max()))
-    columns = empty.terms(v, 1) * empty.coefficients_at(c)[:, :, None] / size[:, :, None]
+    columns = _gradients(kind, v, c) / size[:, :, None]
     A = np.swapaxes(columns, 1, 2).reshape(-1, columns.shape[1])
     b = ((wanted - v) / size).ravel()
     gram = A.T @ A
     weights = np.linalg.solve(gram + ridge * np.eye(len(gram)), A.T @ b)
-    return Anharmonic(kind, weights, empty.reach)
+    return Anharmonic(kind, weights, float(np.linalg.norm(v, axis=1).max()))
