@@ -3,8 +3,9 @@
 All without dimension (base.dataset): pressure P/mu, strains q = (e, k l). With c = cos(angle), mirror images have opposite c, and
 every quantity is even or odd in c: e2, k1 and k3 change sign in the mirror. Odd ones are c times an even function, which is
 learned as a function of c^2 and the logarithms of the lengths. The free strains are led by the one that never vanishes, the
-curvature k2 of a one-sided, the stretch of a twisting segment, as log(strain / P); the others are divided by it. The stiffness
-is L D L^T by the blocks that the half turns of the body leave: unit lower triangular L and log D.
+curvature k2 of a one-sided, the stretch of a twisting segment, as log(strain / P); the others are divided by it. Pressures too
+enter by their logarithm, as the lengths do: what makes a design soft is a product of powers. The stiffness is L D L^T by the
+blocks that the half turns of the body leave: unit lower triangular L and log D.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from geometry.shape_numbers import SHAPE
 #: of (e1, e2, e3, k1, k2, k3) in the mirror y -> -y
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 REST = np.eye(6)[0]
+#: P/mu below which the response is linear anyway: the logarithm is taken of their sum
+SMALL_PRESSURE = 0.01
 #: Segment's lengths that the sample varies on their own
 LENGTHS = {
     ONE_SIDED: ("width", "chamber_height", "cavity_thickness", "wall", "top_wall", "base_thickness", "channel_width", "channel_height"),
@@ -40,7 +43,7 @@ class Coordinates:
     def inputs(self, shape, pressure):
         """(n, d) regression inputs of shape numbers (n, 13) and P/mu (n,)."""
         columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
-        return np.column_stack([cosine(shape) ** 2, np.log(shape[:, columns]), pressure])
+        return np.column_stack([cosine(shape) ** 2, np.log(shape[:, columns]), np.log(pressure + SMALL_PRESSURE)])
 
     # ---- free strains
     @property
@@ -83,7 +86,7 @@ class Coordinates:
         by = np.zeros((n, learned.shape[1], len(SHAPE) + 1))
         by[:, :, 0] = slopes[:, :, 0] * (2 * c * by_angle)[:, None]
         by[:, :, columns] = slopes[:, :, 1:-1] / shape[:, None, columns]
-        by[:, :, -1] = slopes[:, :, -1]
+        by[:, :, -1] = slopes[:, :, -1] / (pressure + SMALL_PRESSURE)[:, None]
         size = np.exp(learned[:, 0]) * pressure
         by_size = size[:, None] * by[:, 0]
         by_size[:, -1] += size / pressure
