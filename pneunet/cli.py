@@ -12,8 +12,7 @@ import time
 from pathlib import Path
 
 from base.errors import ConvergenceError, InputError
-
-MPI_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+from pneunet.launch import RANK_VARIABLES, rank_map
 
 
 class Parser(argparse.ArgumentParser):
@@ -207,7 +206,9 @@ def run_campaign(a):
 def run_train(a):
     from reduced.training import run_training
 
-    run_training(a.data, a.output or a.data.with_name("law.npz"), say, compare=not a.no_comparison)
+    with rank_map() as mapping:
+        if mapping:  # other ranks have worked for this one
+            run_training(a.data, a.output or a.data.with_name("law.npz"), say, not a.no_comparison, mapping)
 
 
 def run_report(a):
@@ -246,7 +247,7 @@ def main(arguments=None):
     except (InputError, ConvergenceError, MemoryError) as error:
         # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with it
         # what rank 0 still has to say, at the first failure
-        if all(os.environ.get(name, "0") == "0" for name in MPI_RANK_VARIABLES):
+        if all(os.environ.get(name, "0") == "0" for name in RANK_VARIABLES):
             print(f"pneunet: {error}", file=sys.stderr, flush=True)
         else:
             time.sleep(1.0)

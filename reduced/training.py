@@ -265,39 +265,61 @@ def learning_curve(states, test):
 # ---- the command
 
 
-def run_training(path, out, say=print, compare=True):
-    """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables. Returns the RodLaw."""
+def run_training(path, out, say=print, compare=True, mapping=map):
+    """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables. Returns the RodLaw.
+
+    mapping: a `map`, over processes for instance; what it computes side by side does not depend on how many there are.
+    """
     data, started = read_dataset(path), time.perf_counter()
-    kinds, figures, lines = {}, {}, [f"# The trained law of {Path(path).name}", ""]
+    sets = {}
     for kind in data.about["kinds"]:
-        (states, prescribed), (test, test_prescribed) = (states_of(data, kind, held_out) for held_out in (False, True))
+        (states, prescribed), (test, test_prescribed) = sets[kind] = [states_of(data, kind, held_out) for held_out in (False, True)]
         designs, held = (len(np.unique(s.design)) for s in (states, test))
-        if designs < 2 * FOLDS or not held or not len(prescribed.forces):
-            raise InputError(f"{path}: {designs} accepted {kind} designs, {held} held out: too few to train on")
+        if designs < 2 * FOLDS or not held or not len(prescribed.forces) or not len(test_prescribed.forces):
+            raise InputError(f"{path}: {designs} accepted {kind} designs, {held} held out: too few, or no prescribed states, to train on")
         say(f"{kind}: {designs} designs to train on, {held} held out")
-        kinds[kind] = fit_kind(states, prescribed)
-        figures[kind] = judge(kinds[kind], test, test_prescribed)
-        lines += [f"## {kind}", "", f"{designs} designs to train on, {held} held out.", "", "| held-out figure | value |", "|---|---|"]
-        lines += [f"| {name} | {value:.4f} |" for name, value in figures[kind].items()]
-        if compare:
-            lines += ["", *_comparison(states, test)]
-        for line in lines[-20:]:
-            say(line)
-    law = RodLaw(kinds, {"data": Path(path).name, "figures": figures, "revisions": data.about["revisions"]})
+    jobs = [(_fitted, sets[kind]) for kind in sets]
+    if compare:
+        jobs += [(job, sets[kind]) for kind in sets for job in (_law_rows, _curve_rows)]
+    done = list(mapping(_do, jobs))
+    fitted = dict(zip(sets, done))
+    rest = iter(done[len(sets) :])
+    tables = {kind: next(rest) + next(rest) for kind in sets} if compare else {}
+    lines = [f"# The trained law of {Path(path).name}"]
+    for kind, (_, figures) in fitted.items():
+        designs, held = (len(np.unique(sets[kind][i][0].design)) for i in (0, 1))
+        lines += ["", f"## {kind}", "", f"{designs} designs to train on, {held} held out.", "", "| held-out figure | value |", "|---|---|"]
+        lines += [f"| {name} | {value:.4f} |" for name, value in figures.items()]
+        lines += tables.get(kind, [])
+    about = {"data": Path(path).name, "figures": {kind: f for kind, (_, f) in fitted.items()}, "revisions": data.about["revisions"]}
+    law = RodLaw({kind: law for kind, (law, _) in fitted.items()}, about)
     write_law(out, law)
     write_text(Path(out).with_suffix(".md"), "\n".join(lines) + "\n")
+    for line in lines:
+        say(line)
     say(f"law in {out}, tables in {Path(out).with_suffix('.md')}; {time.perf_counter() - started:.0f} s")
     return law
 
 
-def _comparison(states, test):
-    yield "| law of the free strains | median error | 95th percentile | without an answer |"
-    yield "|---|---|---|---|"
-    for name, error in compare_laws(states, test).items():
+def _do(job):
+    function, sets = job
+    return function(*sets)
+
+
+def _fitted(training, held_out):
+    law = fit_kind(*training)
+    return [law, judge(law, *held_out)]
+
+
+def _law_rows(training, held_out):
+    rows = ["", "| law of the free strains | median error | 95th percentile | without an answer |", "|---|---|---|---|"]
+    for name, error in compare_laws(training[0], held_out[0]).items():
         good = error[np.isfinite(error)]
-        yield f"| {name} | {np.median(good):.4f} | {np.percentile(good, 95):.4f} | {1 - len(good) / len(error):.1%} |"
-    yield ""
-    yield "| designs trained on | median error | 95th percentile |"
-    yield "|---|---|---|"
-    for designs, median, high in learning_curve(states, test):
-        yield f"| {designs} | {median:.4f} | {high:.4f} |"
+        rows.append(f"| {name} | {np.median(good):.4f} | {np.percentile(good, 95):.4f} | {1 - len(good) / len(error):.1%} |")
+    return rows
+
+
+def _curve_rows(training, held_out):
+    rows = ["", "| designs trained on | median error | 95th percentile |", "|---|---|---|"]
+    rows += [f"| {n} | {median:.4f} | {high:.4f} |" for n, median, high in learning_curve(training[0], held_out[0])]
+    return rows
