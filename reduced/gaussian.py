@@ -7,6 +7,7 @@ are summed up on `inducing` points of their own (deterministic training conditio
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, qr, solve_triangular
@@ -24,8 +25,8 @@ class GaussianProcess:
     """Means of p outputs at inputs of d numbers, which are shifted by `shift` and divided by `width` first.
 
     scales (d,): of the kernel, in those units; points (m, d): in units of the scales too; weights (m + 1 + d, p): of the kernels
-    at the points, the constant and the slopes. root (m + 1 + d, same) and kernel_root (m, m): triangular factors for the
-    deviation, as if every output were as noisy as the first; variance (p,): each output's prior variance.
+    at the points, the constant and the slopes. root (m + 1 + d, same): triangular factor for the deviation, as if every
+    output were as noisy as the first; variance (p,): each output's prior variance.
     """
 
     shift: np.ndarray
@@ -34,9 +35,12 @@ class GaussianProcess:
     points: np.ndarray
     weights: np.ndarray
     root: np.ndarray
-    kernel_root: np.ndarray
     variance: np.ndarray
     noise: float
+
+    @cached_property
+    def _kernel_root(self):
+        return cholesky(_kernel(self.points, self.points) + JITTER * np.eye(len(self.points)), lower=True)
 
     def __call__(self, x, derivative=False):
         """(n, p) at inputs (n, d); with `derivative` also (n, p, d)."""
@@ -58,7 +62,7 @@ class GaussianProcess:
         z = (x - self.shift) / self.width
         kernel = _kernel(z / self.scales, self.points)
         basis = np.hstack([kernel, np.ones((len(x), 1)), z])
-        missed = 1 - (solve_triangular(self.kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
+        missed = 1 - (solve_triangular(self._kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
         known = self.noise * (solve_triangular(self.root, basis.T, trans="T") ** 2).sum(axis=0)
         return np.sqrt((known + np.maximum(missed, 0))[:, None] * self.variance)
 
@@ -68,7 +72,7 @@ def _kernel(a, b):
     return np.exp(-0.5 * np.maximum(squares, 0))
 
 
-def fit(x, y, trust=None, most=500, inducing=700, seed=0, like=None):
+def fit(x, y, trust=None, most=500, inducing=1000, seed=0, like=None):
     """The GaussianProcess through y (n, p) at x (n, d); `like`: another one whose scales and noise are taken as they are.
 
     trust (n, p): an observation's noise is the common one over its trust, for outputs that are quotients by something small.
@@ -124,7 +128,7 @@ def _condition(z, y, trust, groups, chosen, shift, width, scales, noise):
         w[m] += shifted
         weights[:, group] = w
         roots.append(r)
-    return GaussianProcess(shift, width, scales, points, weights, roots[0], kernel_root, variance, noise)
+    return GaussianProcess(shift, width, scales, points, weights, roots[0], variance, noise)
 
 
 def _misfit(log, z, data):

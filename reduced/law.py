@@ -32,7 +32,7 @@ LOWEST = 1e-9
 class KindLaw:
     """The law of one kind. strains, stiffness: GaussianProcess of Coordinates; quantile (6,): what a standard deviation of each
     strain is multiplied by for a 90 % interval; low, high (d,): range of the inputs; doubt: largest deviation of the leading
-    strain that counts as known."""
+    strain that counts as known; level: the mesh that is predicted, by its place among those trained on, the finest last."""
 
     kind: str
     strains: GaussianProcess
@@ -42,28 +42,32 @@ class KindLaw:
     low: np.ndarray
     high: np.ndarray
     doubt: float
+    level: int = 0
 
     @property
     def coordinates(self):
         return Coordinates(self.kind)
 
+    def _inputs(self, shape, pressure):
+        return self.coordinates.inputs(shape, pressure, self.level)
+
     def free_strains(self, shape, pressure):
         """(n, 6) free strains of shape numbers (n, 13) at P/mu (n,)."""
         pressure = np.maximum(pressure, LOWEST)
         co = self.coordinates
-        return co.strains(shape, pressure, self.strains(co.inputs(shape, pressure)))
+        return co.strains(shape, pressure, self.strains(self._inputs(shape, pressure)))
 
     def free_strains_and_slopes(self, shape, pressure):
         """(strains (n, 6), slopes (n, 6, 14)): derivatives by the 13 shape numbers (the angle in degrees) and P/mu."""
         pressure = np.maximum(pressure, LOWEST)
         co = self.coordinates
-        learned, slopes = self.strains(co.inputs(shape, pressure), derivative=True)
+        learned, slopes = self.strains(self._inputs(shape, pressure), derivative=True)
         return co.strains_and_slopes(shape, pressure, learned, slopes)
 
     def free_stiffness(self, shape, pressure):
         """(n, 6, 6) tangent stiffness of the free states."""
         co = self.coordinates
-        return co.stiffness(shape, self.stiffness(co.inputs(shape, pressure)))
+        return co.stiffness(shape, self.stiffness(self._inputs(shape, pressure)))
 
     def half_width(self, shape, pressure):
         """(n, 6) half of the 90 % interval of each free strain."""
@@ -73,12 +77,12 @@ class KindLaw:
     def spread(self, shape, pressure):
         """(n, 6) standard deviation of the free strains as the Gaussian process sees it."""
         co = self.coordinates
-        x = co.inputs(shape, pressure)
+        x = self._inputs(shape, pressure)
         return co.spread(shape, pressure, self.strains(x), self.strains.deviation(x))
 
     def outside(self, shape, pressure):
         """(n,) bool: where the law has not been taught."""
-        x = self.coordinates.inputs(shape, np.maximum(pressure, LOWEST))
+        x = self._inputs(shape, np.maximum(pressure, LOWEST))
         box = ((x < self.low - 1e-9) | (x > self.high + 1e-9)).any(axis=1)
         return box | (self.strains.deviation(x)[:, 0] > self.doubt)
 
@@ -200,10 +204,10 @@ def write_law(path, law):
         for name in ("strains", "stiffness"):
             for f in fields(GaussianProcess):
                 value = np.asarray(getattr(getattr(k, name), f.name))
-                if f.name in ("root", "kernel_root"):
-                    value = np.zeros((0, 0), "f4") if name == "stiffness" else value.astype("f4")
+                if f.name == "root":  # of the stiffness nobody asks the deviation
+                    value = value[np.triu_indices(len(value))].astype("f4")[: 0 if name == "stiffness" else None]
                 arrays[f"{kind}/{name}/{f.name}"] = value
-        arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt")}
+        arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
         arrays |= {f"{kind}/coefficients": k.anharmonic.coefficients, f"{kind}/reach": np.asarray(k.anharmonic.reach)}
     about = {"schema": SCHEMA, "kinds": list(law.kinds), "shape": list(SHAPE), "lengths": LENGTHS, **law.about}
     with atomic_path(path) as temporary:
@@ -225,11 +229,21 @@ def read_law(path):
         raise InputError(f"{path}: not a trained law ({error}): make it again with pneunet train") from None
 
 
+def _triangle(flat):
+    """Upper triangular matrix of its entries, row by row."""
+    n = round((np.sqrt(8 * len(flat) + 1) - 1) / 2)
+    full = np.zeros((n, n))
+    full[np.triu_indices(n)] = flat
+    return full
+
+
 def _read_kind(stored, kind):
     processes = {}
     for name in ("strains", "stiffness"):
         values = {f.name: stored[f"{kind}/{name}/{f.name}"] for f in fields(GaussianProcess)}
-        processes[name] = GaussianProcess(**{**values, "noise": float(values["noise"])})
+        values |= {"noise": float(values["noise"]), "root": _triangle(values["root"])}
+        processes[name] = GaussianProcess(**values)
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, stored[f"{kind}/coefficients"], float(stored[f"{kind}/reach"]))
-    return KindLaw(kind, **processes, anharmonic=anharmonic, **plain, doubt=float(stored[f"{kind}/doubt"]))
+    doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])
+    return KindLaw(kind, **processes, anharmonic=anharmonic, **plain, doubt=doubt, level=level)

@@ -40,10 +40,12 @@ class Coordinates:
 
     kind: str
 
-    def inputs(self, shape, pressure):
-        """(n, d) regression inputs of shape numbers (n, 13) and P/mu (n,)."""
+    def inputs(self, shape, pressure, level):
+        """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a number."""
         columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
-        return np.column_stack([cosine(shape) ** 2, np.log(shape[:, columns]), np.log(pressure + SMALL_PRESSURE)])
+        return np.column_stack(
+            [cosine(shape) ** 2, np.log(shape[:, columns]), np.log(pressure + SMALL_PRESSURE), np.broadcast_to(level, len(shape))]
+        )
 
     # ---- free strains
     @property
@@ -85,8 +87,8 @@ class Coordinates:
         columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
         by = np.zeros((n, learned.shape[1], len(SHAPE) + 1))
         by[:, :, 0] = slopes[:, :, 0] * (2 * c * by_angle)[:, None]
-        by[:, :, columns] = slopes[:, :, 1:-1] / shape[:, None, columns]
-        by[:, :, -1] = slopes[:, :, -1] / (pressure + SMALL_PRESSURE)[:, None]
+        by[:, :, columns] = slopes[:, :, 1:-2] / shape[:, None, columns]
+        by[:, :, -1] = slopes[:, :, -2] / (pressure + SMALL_PRESSURE)[:, None]
         size = np.exp(learned[:, 0]) * pressure
         by_size = size[:, None] * by[:, 0]
         by_size[:, -1] += size / pressure

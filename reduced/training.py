@@ -7,7 +7,7 @@ deviation as their shape); nothing of the held-out designs is used before the la
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,8 +38,8 @@ DOUBT = 2.0
 
 @dataclass(frozen=True)
 class States:
-    """Rows of one kind on one mesh: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers, and
-    size (n,): norm of the free strains, rest taken off, at the design's top pressure."""
+    """Rows of one kind: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers, level (n,) of the
+    mesh, and size (n,): norm of the free strains, rest taken off, at the case's top pressure."""
 
     kind: str
     shape: np.ndarray
@@ -47,10 +47,16 @@ class States:
     strains: np.ndarray
     matrices: np.ndarray
     design: np.ndarray
+    level: np.ndarray
     size: np.ndarray
 
     def of(self, chosen):
-        return States(self.kind, *(getattr(self, n)[chosen] for n in ("shape", "pressure", "strains", "matrices", "design", "size")))
+        names = ("shape", "pressure", "strains", "matrices", "design", "level", "size")
+        return States(self.kind, *(getattr(self, name)[chosen] for name in names))
+
+    @property
+    def inputs(self):
+        return Coordinates(self.kind).inputs(self.shape, self.pressure, self.level)
 
 
 @dataclass(frozen=True)
@@ -61,11 +67,16 @@ class Prescribed:
     change: np.ndarray
     forces: np.ndarray
 
+    def of(self, chosen):
+        return Prescribed(self.free.of(chosen), self.change[chosen], self.forces[chosen])
 
-def states_of(data, kind, held_out, mesh=0):
+
+def states_of(data, kind, held_out):
     """(States of the accepted free states, rest included, Prescribed) of a kind, of the held-out designs or of all others."""
     k = data.about["kinds"].index(kind)
-    cases = data.accepted & (data.kind == k) & (data.mesh == mesh) & (data.held_out == held_out)
+    cases = data.accepted & (data.kind == k) & (data.held_out == held_out)
+    sizes = [mesh["mesh_size_mm"] for mesh in data.about["meshes"]]
+    level = np.argsort(np.argsort(sizes)[::-1])  # the finest last
     rows = np.flatnonzero(cases[data.case])
     free, held = rows[~data.prescribed[rows]], rows[data.prescribed[rows]]
     top = {}
@@ -76,6 +87,7 @@ def states_of(data, kind, held_out, mesh=0):
         kind,
         *(a.astype(float) for a in (data.shape[data.case[free]], data.pressure[free], data.strains[free], data.matrices[free])),
         data.design[data.case[free]],
+        level[data.mesh[data.case[free]]],
         np.array([top[data.case[i]] for i in free]),
     )
     where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)
@@ -92,7 +104,7 @@ def fit_strains(states, like=None):
     co = Coordinates(states.kind)
     y = co.learned_strains(states.shape, states.pressure, states.strains)
     trust = odd(co.strain_parity, np.abs(cosine(states.shape)))
-    return gaussian.fit(co.inputs(states.shape, states.pressure), y, trust, like=like)
+    return gaussian.fit(states.inputs, y, trust, like=like)
 
 
 def fit_stiffness(states):
@@ -101,7 +113,7 @@ def fit_stiffness(states):
     y = co.learned_stiffness(states.shape, states.matrices)
     good = np.isfinite(y).all(axis=1)
     trust = odd(co.stiffness_parity, np.abs(cosine(states.shape)))
-    return gaussian.fit(co.inputs(states.shape, states.pressure)[good], y[good], trust[good])
+    return gaussian.fit(states.inputs[good], y[good], trust[good])
 
 
 def fit_kind(states, prescribed):
@@ -109,11 +121,11 @@ def fit_kind(states, prescribed):
     strains, stiffness = fit_strains(states), fit_stiffness(states)
     f = prescribed.free
     anharmonic = fit_anharmonic(states.kind, cosine(f.shape), _symmetric(f.matrices), prescribed.change, prescribed.forces)
-    x = Coordinates(states.kind).inputs(states.shape, states.pressure)
+    x = states.inputs
     doubt = DOUBT * float(strains.deviation(x)[:, 0].max())
-    law = KindLaw(states.kind, strains, stiffness, anharmonic, np.ones(6), x.min(axis=0), x.max(axis=0), doubt)
+    law = KindLaw(states.kind, strains, stiffness, anharmonic, np.ones(6), x.min(axis=0), x.max(axis=0), doubt, int(states.level.max()))
     quantile = _quantiles(law, states)
-    return KindLaw(**{**vars(law), "quantile": quantile})
+    return replace(law, quantile=quantile)
 
 
 def _symmetric(K):
@@ -135,10 +147,10 @@ def _quantiles(law, states):
     scores = []
     for train, test in _folds(states):
         process = fit_strains(states.of(train), like=law.strains)
-        part = KindLaw(**{**vars(law), "strains": process})
         t = states.of(test)
-        spread = part.spread(t.shape, t.pressure)
-        miss = np.abs(part.free_strains(t.shape, t.pressure) - t.strains)
+        learned, co = process(t.inputs), law.coordinates
+        spread = co.spread(t.shape, t.pressure, learned, process.deviation(t.inputs))
+        miss = np.abs(co.strains(t.shape, t.pressure, learned) - t.strains)
         scores.append(np.divide(miss, spread, out=np.zeros_like(miss), where=spread > 0))
     return np.quantile(np.concatenate(scores), INTERVAL, axis=0)
 
@@ -164,8 +176,8 @@ def analytic_strains(states):
 
 
 def compare_laws(train, test):
-    """{name: (n,) errors on the test states} of the three laws; where the analytic model has no answer they are nan."""
-    train, test = train.of(train.pressure > 0), test.of(test.pressure > 0)
+    """{name: (n,) errors on the test states of the coarsest mesh} of the three laws; nan where the analytic model has no answer."""
+    train, test = (s.of((s.pressure > 0) & (s.level == 0)) for s in (train, test))
     co = Coordinates(train.kind)
     a_train, a_test = analytic_strains(train), analytic_strains(test)
     known = np.isfinite(a_train).all(axis=1)
@@ -174,7 +186,7 @@ def compare_laws(train, test):
     factor = (a * q).sum(axis=0) / np.maximum((a * a).sum(axis=0), 1e-30)
     laws = {"calibrated analytic model": REST + factor * (a_test - REST)}
     process = fit_strains(train)
-    laws["regressor"] = co.strains(test.shape, test.pressure, process(co.inputs(test.shape, test.pressure)))
+    laws["regressor"] = co.strains(test.shape, test.pressure, process(test.inputs))
     laws["analytic model and regressor"] = _corrected(co, train, a_train, test, a_test)
     return {name: strain_error(test, strains) for name, strains in laws.items()}
 
@@ -185,8 +197,8 @@ def _corrected(co, train, a_train, test, a_test):
     y = co.learned_strains(train.shape, train.pressure, train.strains) - learned[0]
     good = np.isfinite(y).all(axis=1)
     trust = odd(co.strain_parity, np.abs(cosine(train.shape)))
-    process = gaussian.fit(co.inputs(train.shape, train.pressure)[good], y[good], trust[good])
-    return co.strains(test.shape, test.pressure, learned[1] + process(co.inputs(test.shape, test.pressure)))
+    process = gaussian.fit(train.inputs[good], y[good], trust[good])
+    return co.strains(test.shape, test.pressure, learned[1] + process(test.inputs))
 
 
 # ---- judging
@@ -232,12 +244,16 @@ def coverage(law, states):
 
 
 def judge(law, states, prescribed):
-    """{figure: value} on held-out states."""
+    """{figure: value} on held-out states: of the coarsest mesh, which most designs have, with the law for that mesh; of the free
+    strains on the finest mesh with the law as it is, where there are several."""
+    fine = states.of((states.level == law.level) & (states.pressure > 0))
+    figures = _on_finest(law, fine) if law.level and len(fine.size) else {}
+    law, states, prescribed = replace(law, level=0), states.of(states.level == 0), prescribed.of(prescribed.free.level == 0)
     loaded = states.of(states.pressure > 0)
     q = law.free_strains(loaded.shape, loaded.pressure)
     strain, tip = strain_error(loaded, q), tip_error(loaded, q)
     stiffness = stiffness_error(states, law.free_stiffness(states.shape, states.pressure))
-    figures = {
+    figures |= {
         "law_strain_median_rel": np.median(strain),
         "law_strain_p95_rel": np.percentile(strain, 95),
         "law_tip100_p95_rel": np.percentile(tip, 95),
@@ -249,15 +265,24 @@ def judge(law, states, prescribed):
     return {name: float(value) for name, value in figures.items()}
 
 
+def _on_finest(law, fine):
+    error = strain_error(fine, law.free_strains(fine.shape, fine.pressure))
+    return {
+        "finest_mesh_held_out_designs": len(np.unique(fine.design)),
+        "finest_mesh_strain_median_rel": np.median(error),
+        "finest_mesh_strain_p95_rel": np.percentile(error, 95),
+    }
+
+
 def learning_curve(states, test):
     """[(designs, median, 95th percentile)] of the free strains' error for parts of the training designs, the first ones."""
+    states, test = (s.of((s.pressure > 0) & (s.level == 0)) for s in (states, test))
     numbers, rows = np.unique(states.design), []
-    test = test.of(test.pressure > 0)
     co = Coordinates(states.kind)
     for part in CURVE:
         some = states.of(np.isin(states.design, numbers[: max(8, round(part * len(numbers)))]))
         process = fit_strains(some)
-        error = strain_error(test, co.strains(test.shape, test.pressure, process(co.inputs(test.shape, test.pressure))))
+        error = strain_error(test, co.strains(test.shape, test.pressure, process(test.inputs)))
         rows.append((len(np.unique(some.design)), float(np.median(error)), float(np.percentile(error, 95))))
     return rows
 
