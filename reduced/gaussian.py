@@ -1,9 +1,10 @@
 """Gaussian processes: smooth functions of several inputs from few points, with their uncertainty.
 
 Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x')/scales|^2 / 2) + TREND (1 + x.x'), a smooth function
-and a plane whose coefficients are hardly restricted; and noise on the observations. Scales and noise are shared by the outputs
-and maximise the likelihood, with each output's variance profiled out (Rasmussen & Williams 2006, ch. 2 and 5). Many observations
-are summed up on `inducing` points of their own (deterministic training conditional, ch. 8.3), exactly when all of them are taken.
+and a plane whose coefficients are hardly restricted; noise on the observations, and noise that those of a group (the states of one
+mesh) have in common. Scales and noises are shared by the outputs and maximise the likelihood, with each output's variance profiled
+out (Rasmussen & Williams 2006, ch. 2 and 5). Many observations are summed up on `inducing` points of their own (deterministic
+training conditional, ch. 8.3), exactly when all of them are taken.
 """
 
 from dataclasses import dataclass
@@ -37,6 +38,7 @@ class GaussianProcess:
     root: np.ndarray
     variance: np.ndarray
     noise: float
+    common_noise: float
 
     @cached_property
     def _kernel_root(self):
@@ -72,10 +74,11 @@ def _kernel(a, b):
     return np.exp(-0.5 * np.maximum(squares, 0))
 
 
-def fit(x, y, trust=None, most=500, inducing=1000, seed=0, like=None):
+def fit(x, y, group, trust=None, most=500, inducing=1000, seed=0, like=None):
     """The GaussianProcess through y (n, p) at x (n, d); `like`: another one whose scales and noise are taken as they are.
 
-    trust (n, p): an observation's noise is the common one over its trust, for outputs that are quotients by something small.
+    group (n,): equal where noise is common. trust (n, p), the same within a group: what noises are divided by, for outputs that
+    are quotients by something small.
     Scales are found on at most `most` of the observations.
     """
     trust = np.ones(y.shape) if trust is None else trust
@@ -83,22 +86,21 @@ def fit(x, y, trust=None, most=500, inducing=1000, seed=0, like=None):
     z, order = (x - shift) / width, np.random.default_rng(seed).permutation(len(x))
     if like is not None:
         shift, width = like.shift, like.width
-        return _condition((x - shift) / width, y, trust, _alike(trust), order[:inducing], shift, width, like.scales, like.noise)
+        return _condition((x - shift) / width, y, group, trust, order[:inducing], shift, width, like.scales, like.noise, like.common_noise)
     some = order[:most]
-    groups = _alike(trust)
-    data = [(y[np.ix_(some, g)], trust[some, g[0]]) for g in groups]
-    centred = [(v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum(), t**-2) for v, t in data]
+    data = [(y[np.ix_(some, g)], trust[some, g[0]]) for g in _alike(trust)]
+    centred = [(v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum(), 1 / t) for v, t in data]
+    same = group[some][:, None] == group[some]
     found = minimize(
         _misfit,
-        np.append(np.full(z.shape[1], np.log(3.0)), np.log(1e-4)),
-        (z[some], centred),
+        np.append(np.full(z.shape[1], np.log(3.0)), np.log([1e-4, 1e-4])),
+        (z[some], centred, same),
         jac=True,
         method="L-BFGS-B",
-        bounds=[LOG_SCALE] * z.shape[1] + [LOG_NOISE],
+        bounds=[LOG_SCALE] * z.shape[1] + [LOG_NOISE] * 2,
         options={"maxiter": 100},
     )
-    scales, noise = np.exp(found.x[:-1]), float(np.exp(found.x[-1]))
-    return _condition(z, y, trust, groups, order[:inducing], shift, width, scales, noise)
+    return _condition(z, y, group, trust, order[:inducing], shift, width, np.exp(found.x[:-2]), *np.exp(found.x[-2:]).tolist())
 
 
 def _alike(trust):
@@ -109,7 +111,7 @@ def _alike(trust):
     return list(groups.values())
 
 
-def _condition(z, y, trust, groups, chosen, shift, width, scales, noise):
+def _condition(z, y, group, trust, chosen, shift, width, scales, noise, common_noise):
     points, (d, p) = z[chosen] / scales, (z.shape[1], y.shape[1])
     m = len(points)
     basis = np.hstack([_kernel(z / scales, points), np.ones((len(z), 1)), z])
@@ -117,31 +119,45 @@ def _condition(z, y, trust, groups, chosen, shift, width, scales, noise):
     prior = np.zeros((m + 1 + d, m + 1 + d))
     prior[:m, :m], prior[m:, m:] = kernel_root.T, np.eye(1 + d) / np.sqrt(TREND)
     weights, variance, roots = np.zeros((m + 1 + d, p)), np.zeros(p), []
-    for group in groups:
-        t = trust[:, group[0]][:, None]
-        shifted = (t**2 * y[:, group]).sum(axis=0) / (t**2).sum()
-        q, r = qr(np.vstack([t * basis, np.sqrt(noise) * prior]), mode="economic")
-        right = t * (y[:, group] - shifted)
+    white = _whitener(group, common_noise / noise)
+    for columns in _alike(trust):
+        t = trust[:, columns[0]][:, None]
+        shifted = (t**2 * y[:, columns]).sum(axis=0) / (t**2).sum()
+        left, right = white(t * basis), white(t * (y[:, columns] - shifted))
+        q, r = qr(np.vstack([left, np.sqrt(noise) * prior]), mode="economic")
         w = solve_triangular(r, q[: len(z)].T @ right)
-        misfit = ((right - t * (basis @ w)) ** 2).sum(axis=0) / noise + ((prior @ w) ** 2).sum(axis=0)
-        variance[group] = misfit / len(z)
+        variance[columns] = (((right - left @ w) ** 2).sum(axis=0) / noise + ((prior @ w) ** 2).sum(axis=0)) / len(z)
         w[m] += shifted
-        weights[:, group] = w
+        weights[:, columns] = w
         roots.append(r)
-    return GaussianProcess(shift, width, scales, points, weights, roots[0], variance, noise)
+    return GaussianProcess(shift, width, scales, points, weights, roots[0], variance, noise, common_noise)
 
 
-def _misfit(log, z, data):
-    """Minus the log likelihood, each output's variance profiled out, and its gradient by the logarithms of scales and noise."""
-    n, scales, noise = len(z), np.exp(log[:-1]), np.exp(log[-1])
+def _whitener(group, ratio):
+    """(n, p) -> (n, p): times the inverse root of I + ratio (1 where rows are of one group)."""
+    _, index, count = np.unique(group, return_inverse=True, return_counts=True)
+    part = 1 - 1 / np.sqrt(1 + ratio * count)
+
+    def white(a):
+        sums = np.zeros((len(count), a.shape[1]))
+        np.add.at(sums, index, a)
+        return a - (part / count)[index, None] * sums[index]
+
+    return white
+
+
+def _misfit(log, z, data, same):
+    """Minus the log likelihood, each output's variance profiled out, and its gradient by the logarithms of scales and noises."""
+    n, scales, noises = len(z), np.exp(log[:-2]), np.exp(log[-2:])
     a = z / scales
     kernel = _kernel(a, a)
     prior = kernel + TREND * (1 + z @ z.T)
-    value, outer_sum, by_noise = 0.0, np.zeros((n, n)), 0.0
+    value, outer_sum, by_noise = 0.0, np.zeros((n, n)), np.zeros(2)
     for y, doubt in data:
         p = y.shape[1]
+        noise = np.outer(doubt, doubt) * (noises[0] * np.eye(n) + noises[1] * same)
         try:
-            factor = cho_factor(prior + np.diag(noise * doubt), lower=True)
+            factor = cho_factor(prior + noise, lower=True)
         except np.linalg.LinAlgError:
             return 1e10, np.zeros(len(log))
         weights = cho_solve(factor, y)
@@ -149,7 +165,8 @@ def _misfit(log, z, data):
         value += n / 2 * np.log(variance).sum() + p * np.log(np.diag(factor[0])).sum()
         outer = p / 2 * cho_solve(factor, np.eye(n)) - (weights / variance) @ weights.T / 2
         outer_sum += outer
-        by_noise += noise * np.diag(outer) @ doubt
+        doubted = outer * np.outer(doubt, doubt)
+        by_noise += noises * [np.trace(doubted), doubted[same].sum()]
     s = outer_sum * kernel
     by_scale = 2 * (s.sum(axis=1) @ a**2 - (a * (s @ a)).sum(axis=0))
     return value, np.append(by_scale, by_noise)

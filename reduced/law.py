@@ -241,7 +241,7 @@ def _read_kind(stored, kind):
     processes = {}
     for name in ("strains", "stiffness"):
         values = {f.name: stored[f"{kind}/{name}/{f.name}"] for f in fields(GaussianProcess)}
-        values |= {"noise": float(values["noise"]), "root": _triangle(values["root"])}
+        values |= {name: float(values[name]) for name in ("noise", "common_noise")} | {"root": _triangle(values["root"])}
         processes[name] = GaussianProcess(**values)
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, stored[f"{kind}/coefficients"], float(stored[f"{kind}/reach"]))

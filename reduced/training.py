@@ -55,6 +55,11 @@ class States:
         return States(self.kind, *(getattr(self, name)[chosen] for name in names))
 
     @property
+    def case(self):
+        """(n,) equal for the states of one design on one mesh."""
+        return self.design * (1 + self.level.max(initial=0)) + self.level
+
+    @property
     def inputs(self):
         return Coordinates(self.kind).inputs(self.shape, self.pressure, self.level)
 
@@ -104,7 +109,7 @@ def fit_strains(states, like=None):
     co = Coordinates(states.kind)
     y = co.learned_strains(states.shape, states.pressure, states.strains)
     trust = odd(co.strain_parity, np.abs(cosine(states.shape)))
-    return gaussian.fit(states.inputs, y, trust, like=like)
+    return gaussian.fit(states.inputs, y, states.case, trust, like=like)
 
 
 def fit_stiffness(states):
@@ -113,7 +118,7 @@ def fit_stiffness(states):
     y = co.learned_stiffness(states.shape, states.matrices)
     good = np.isfinite(y).all(axis=1)
     trust = odd(co.stiffness_parity, np.abs(cosine(states.shape)))
-    return gaussian.fit(states.inputs[good], y[good], trust[good])
+    return gaussian.fit(states.inputs[good], y[good], states.case[good], trust[good])
 
 
 def fit_kind(states, prescribed):
@@ -197,7 +202,7 @@ def _corrected(co, train, a_train, test, a_test):
     y = co.learned_strains(train.shape, train.pressure, train.strains) - learned[0]
     good = np.isfinite(y).all(axis=1)
     trust = odd(co.strain_parity, np.abs(cosine(train.shape)))
-    process = gaussian.fit(train.inputs[good], y[good], trust[good])
+    process = gaussian.fit(train.inputs[good], y[good], train.case[good], trust[good])
     return co.strains(test.shape, test.pressure, learned[1] + process(test.inputs))
 
 
