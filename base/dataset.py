@@ -81,6 +81,11 @@ class CellData:
         return full
 
     @property
+    def overlapping(self):
+        """(m,) bool: walls have passed through one another, without contact: no state of a real cell."""
+        return (self.wall_distance < 0) & ~self.contact
+
+    @property
     def accepted(self):
         """(n,) bool: the path came to its top pressure, stable all the way, and kept the symmetry of the body."""
         done = self.status == self.about["statuses"].index("done")

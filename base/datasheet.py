@@ -16,8 +16,8 @@ def datasheet(data):
 
 
 def _counts(data, k):
-    yield "| mesh | cases | accepted | held out | free states | prescribed states | limit load met | CPU hours |"
-    yield "|---|---|---|---|---|---|---|---|"
+    yield "| mesh | cases | accepted | held out | free states | prescribed states | limit load met | walls touch | CPU hours |"
+    yield "|---|---|---|---|---|---|---|---|---|"
     for m, mesh in enumerate(data.about["meshes"]):
         rows = (data.kind == k) & (data.mesh == m)
         states = rows[data.case]
@@ -25,13 +25,14 @@ def _counts(data, k):
             continue
         share = data.accepted[rows].mean()
         numbers = [
-            f"{mesh['name']} ({mesh['mesh_size_mm']:g} mm)",
+            f"{mesh['name']} ({', '.join(f'{key} {value:g}' for key, value in mesh.items() if key != 'name')})",
             rows.sum(),
             f"{data.accepted[rows].sum()} ({share:.1%})",
             (rows & data.held_out).sum(),
             (states & ~data.prescribed).sum(),
             f"{(states & data.prescribed).sum()} ({data.missing[rows].sum()} not reached)",
             np.isfinite(data.limit_pressure[rows]).sum(),
+            np.isfinite(data.first_touch[rows]).sum(),
             f"{data.seconds[rows].sum() / 3600:.2f}",
         ]
         yield "| " + " | ".join(map(str, numbers)) + " |"

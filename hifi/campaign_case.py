@@ -43,11 +43,11 @@ def solve_campaign_case(inputs, directory):
     """Case of hifi.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share", "prescribed"}.
 
     directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where there was none),
-    top pressure, why prescribed states are missing, CPU time. ConvergenceError when the free path ends before its top pressure.
+    top pressure, first touch of walls, why prescribed states are missing, CPU time. ConvergenceError when the free path ends before its top pressure.
     """
     segment = segment_from_table(inputs["segment"], "segment", material_from_table(inputs["material"], "material"))
     path = directory / "cell.msh"
-    mesh = mesh_cell(segment, inputs["mesh"]["mesh_size_mm"], path)
+    mesh = mesh_cell(segment, path=path, **inputs["mesh"])
     sampler = Sampler(CellProblem(segment, path), directory)
     path.unlink()
     mesh["unknowns"] = sampler.problem.unknowns
@@ -55,7 +55,14 @@ def solve_campaign_case(inputs, directory):
     levels = top * np.arange(inputs["levels"] + 1) / inputs["levels"]
     sampler.free(levels)
     missing = sampler.prescribed(inputs["prescribed"])
-    return {"mesh": mesh, "limit_pressure": limit, "top_pressure": top, "missing": missing, "cpu_seconds": time.process_time()}
+    return {
+        "mesh": mesh,
+        "limit_pressure": limit,
+        "top_pressure": top,
+        "first_touch": first_touch(sampler.states),
+        "missing": missing,
+        "cpu_seconds": time.process_time(),
+    }
 
 
 class Sampler:
@@ -175,6 +182,15 @@ class Sampler:
             self._record(system.state, result.steps[-1].residual, "prescribed", system)
         finally:
             system.destroy()
+
+
+def first_touch(states):
+    """Pressure (MPa) at which the free states' wall distance passes zero; None where it does not or is not known."""
+    known = [(s["pressure"], s["wall_distance"]) for s in states if s["kind"] == "free" and s["wall_distance"] is not None]
+    for (p, a), (q, b) in zip(known, known[1:]):
+        if a > 0 >= b:
+            return p + (q - p) * a / (a - b)
+    return None
 
 
 def prescribed_change(q, stiffness, amplitude, direction):

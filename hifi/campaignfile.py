@@ -19,13 +19,14 @@ KEYS = ("kinds", "designs", "seed", "held_out_every", "levels", "top_pressure_ov
 
 @dataclass(frozen=True)
 class Mesh:
-    """mesh_size in mm; every: n-th designs, from the first, are computed on it.
+    """What geometry.cell.mesh_cell is asked for (`settings`, keyword arguments in mm); every: n-th designs, from the first, are
+    computed on it.
 
     prescribed: states at prescribed strains of every prescribed_every-th of those.
     """
 
     name: str
-    mesh_size: float
+    settings: dict
     every: int = 1
     prescribed: int = 0
     prescribed_every: int = 1
@@ -113,7 +114,7 @@ def _case(kind, index, mesh, segment, prescribed, common):
     inputs = {
         "segment": to_table(segment),
         "material": material_to_table(segment.material),
-        "mesh": {"mesh_size_mm": mesh.mesh_size},
+        "mesh": mesh.settings,
         **common,
         "prescribed": [asdict(p) for p in prescribed],
     }
@@ -127,19 +128,22 @@ def _meshes(rows, where):
     meshes = []
     for i, row in enumerate(rows, start=1):
         at = f"{where} [[mesh]] {i}"
-        refuse_unknown(row, ["name", "mesh_size_mm", "every", "prescribed", "prescribed_every"], at)
+        refuse_unknown(row, ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every"], at)
         for key in ("name", "mesh_size_mm"):
             if key not in row:
                 raise InputError(f"{at}: key '{key}' is missing")
-        size = number(row["mesh_size_mm"], "mesh_size_mm", at)
+        settings = {}
+        for key in ("mesh_size_mm", "edge_size_mm"):
+            if key in row:
+                settings[key.removesuffix("_mm")] = float(number(row[key], key, at))
+                if not 0.02 <= row[key] <= 20:
+                    raise InputError(f"{at}: {key} = {row[key]:g} must lie in 0.02..20")
         counts = []
         for key, default, low, high in (("every", 1, 1, 10_000), ("prescribed", 0, 0, PLACES), ("prescribed_every", 1, 1, 10_000)):
             counts.append(number(row.get(key, default), key, at, integer=True))
             if not low <= counts[-1] <= high:
                 raise InputError(f"{at}: {key} = {counts[-1]} must lie in {low}..{high}")
-        if not 0.1 <= size <= 20:
-            raise InputError(f"{at}: mesh_size_mm = {size:g} must lie in 0.1..20")
-        meshes.append(Mesh(str(row["name"]), float(size), *counts))
+        meshes.append(Mesh(str(row["name"]), settings, *counts))
     if len({m.name for m in meshes}) < len(meshes):
         raise InputError(f"{where}: two [[mesh]] have the same name")
     return tuple(meshes)

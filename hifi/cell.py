@@ -146,10 +146,10 @@ class CellProblem:
         keep = self.reduced >= 0
         return np.bincount(self.reduced[keep], self._vector.array[keep], minlength=self.unknowns)
 
-    def residual(self, strains=range(6)):
-        """(dPi/du,p (unknowns,), dPi/d(e,k) (6,), of the `strains` asked for) at the current state, strains and pressure."""
-        slope = np.zeros(6)
-        for i in strains:
+    def residual(self):
+        """(dPi/du,p (unknowns,), dPi/d(e,k) (6,)) at the current state, strains and pressure."""
+        slope = np.empty(6)
+        for i in range(6):
             self._left.value[:] = np.eye(6)[i]
             slope[i] = fem.assemble_scalar(self._slope)
         return self._vector_of(self._residual), slope

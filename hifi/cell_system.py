@@ -90,17 +90,17 @@ class CellSystem:
         return state
 
     # ---- residual and tangent
-    def _parts(self, wanted=range(6)):
-        """(residual of the unknowns and the gauge, residual of the six strains or those wanted) at the current state."""
+    def _parts(self):
+        """(residual of the unknowns and the gauge, residual of all six strains) at the current state."""
         n = self.problem.unknowns
-        forces, slope = self.problem.residual(wanted)
+        forces, slope = self.problem.residual()
         gauge, gauge_strains = self.problem.gauge, self.problem.gauge_strains
         multipliers, strains = self._x[n : n + 6], self._x[n + 6 :]
         r = np.concatenate([forces + gauge @ multipliers, gauge.T @ self._x[:n] + gauge_strains @ strains])
         return r, slope + gauge_strains.T @ multipliers
 
     def residual(self):
-        r, slope = self._parts(self._free)
+        r, slope = self._parts()
         return np.concatenate([r, slope[self._free] / self.pitch]), self.problem.segment.material.mu * self.pitch**2
 
     def load_gradient(self):

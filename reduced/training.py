@@ -80,9 +80,9 @@ def states_of(data, kind, held_out):
     """(States of the accepted free states, rest included, Prescribed) of a kind, of the held-out designs or of all others."""
     k = data.about["kinds"].index(kind)
     cases = data.accepted & (data.kind == k) & (data.held_out == held_out)
-    sizes = [mesh["mesh_size_mm"] for mesh in data.about["meshes"]]
-    level = np.argsort(np.argsort(sizes)[::-1])  # the finest last
-    rows = np.flatnonzero(cases[data.case])
+    sizes = [min(size for key, size in mesh.items() if key != "name") for mesh in data.about["meshes"]]
+    level = np.argsort(np.argsort(-np.array(sizes)))  # the finest last
+    rows = np.flatnonzero(cases[data.case] & ~data.overlapping)
     free, held = rows[~data.prescribed[rows]], rows[data.prescribed[rows]]
     top = {}
     for i in free:  # pressures increase
@@ -95,6 +95,7 @@ def states_of(data, kind, held_out):
         level[data.mesh[data.case[free]]],
         np.array([top[data.case[i]] for i in free]),
     )
+    held = np.array([i for i in held if (data.case[i], round(float(data.pressure[i]), 6)) in at], int)
     where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)
     change = data.strains[held].astype(float) - states.strains[where]
     return states, Prescribed(states.of(where), change, data.forces[held].astype(float))

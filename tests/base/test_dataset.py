@@ -65,7 +65,7 @@ def test_energy_defect_is_what_the_work_of_the_pressure_misses(data):
 
 def test_the_data_sheet_names_what_was_not_accepted(data):
     text = datasheet(data)
-    assert "| coarse (2 mm) | 3 | 1 (33.3%) |" in text
+    assert "| coarse (mesh_size_mm 2) | 3 | 1 (33.3%) |" in text
     assert "crashed: ended by signal SIGSEGV" in text and "symmetry defect 10.0%" in text
 
 

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from base.errors import InputError
 from geometry.parameters import ONE_SIDED, TWISTING
 from geometry.shape_numbers import SHAPE, shape_numbers
-from hifi.campaign_case import prescribed_change
+from hifi.campaign_case import first_touch, prescribed_change
 from hifi.campaign_sample import RANGES, prescribed_states, segments
 from hifi.campaignfile import read_campaign
 
@@ -81,6 +81,12 @@ def test_prescribed_strains_take_the_energy_they_are_told():
         assert 0.4 <= p.amplitude <= 1.5
     twofold = prescribed_states(ONE_SIDED, 1, 1, 5)[0][0]
     assert q + prescribed_change(q, K, twofold.amplitude, twofold.direction) == pytest.approx([1.2, 0.04, 0, 0.06, 0.4, 0])
+
+
+def test_first_touch_is_where_the_wall_distance_passes_zero():
+    states = [{"kind": "free", "pressure": p, "wall_distance": d} for p, d in ((0.0, 1.0), (0.1, 0.25), (0.2, -0.25), (0.3, -0.5))]
+    assert first_touch(states) == pytest.approx(0.15)
+    assert first_touch(states[:2]) is None and first_touch([{**s, "wall_distance": None} for s in states]) is None
 
 
 @pytest.mark.parametrize(
