@@ -98,7 +98,7 @@ class Gathering:
                     rows[name].append(value)
         about = {
             "kinds": list(c.kinds),
-            "meshes": [{"name": m.name, **{f"{key}_mm": value for key, value in m.settings.items()}} for m in c.meshes],
+            "meshes": [{"name": m.name, **m.settings} for m in c.meshes],
             "shape": list(SHAPE),
             "statuses": STATUSES,
             "reasons": reasons,

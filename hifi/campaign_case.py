@@ -43,11 +43,12 @@ def solve_campaign_case(inputs, directory):
     """Case of hifi.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share", "prescribed"}.
 
     directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where there was none),
-    top pressure, first touch of walls, why prescribed states are missing, CPU time. ConvergenceError when the free path ends before its top pressure.
+    top pressure, first touch of walls, why prescribed states are missing, CPU time. ConvergenceError when the free path ends
+    before its top pressure.
     """
     segment = segment_from_table(inputs["segment"], "segment", material_from_table(inputs["material"], "material"))
     path = directory / "cell.msh"
-    mesh = mesh_cell(segment, path=path, **inputs["mesh"])
+    mesh = mesh_cell(segment, path=path, **{key.removesuffix("_mm"): value for key, value in inputs["mesh"].items()})
     sampler = Sampler(CellProblem(segment, path), directory)
     path.unlink()
     mesh["unknowns"] = sampler.problem.unknowns

@@ -19,7 +19,7 @@ KEYS = ("kinds", "designs", "seed", "held_out_every", "levels", "top_pressure_ov
 
 @dataclass(frozen=True)
 class Mesh:
-    """What geometry.cell.mesh_cell is asked for (`settings`, keyword arguments in mm); every: n-th designs, from the first, are
+    """What geometry.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th designs, from the first, are
     computed on it.
 
     prescribed: states at prescribed strains of every prescribed_every-th of those.
@@ -135,7 +135,7 @@ def _meshes(rows, where):
         settings = {}
         for key in ("mesh_size_mm", "edge_size_mm"):
             if key in row:
-                settings[key.removesuffix("_mm")] = float(number(row[key], key, at))
+                settings[key] = float(number(row[key], key, at))
                 if not 0.02 <= row[key] <= 20:
                     raise InputError(f"{at}: {key} = {row[key]:g} must lie in 0.02..20")
         counts = []
