@@ -12,8 +12,7 @@ import time
 from pathlib import Path
 
 from base.errors import ConvergenceError, InputError
-
-MPI_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+from pneunet.launch import RANK_VARIABLES, rank_map
 
 
 class Parser(argparse.ArgumentParser):
@@ -114,6 +113,18 @@ def parser():
     c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the study; finished cases there are kept")
 
+    c = add("campaign", run_campaign, "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml")
+    c.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml")
+    c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
+    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the campaign; finished cases there are kept")
+
+    c = add("train", run_train, "the rod law from a data set of cells, with its errors on held-out designs")
+    c.add_argument("data", type=Path, metavar="DATA.npz")
+    c.add_argument("--no-comparison", action="store_true", help="leave out the other laws and the learning curve")
+    c.add_argument(
+        "-o", "--output", type=Path, metavar="LAW.npz", help="default: law.npz beside the data; tables get the same name with .md"
+    )
+
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
 
@@ -186,6 +197,20 @@ def run_study(a):
     work(a.study, a.output or Path("out") / a.study.stem, say=say, retry=a.retry)
 
 
+def run_campaign(a):
+    from hifi.campaign import run_campaign as work
+
+    work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry)
+
+
+def run_train(a):
+    from reduced.training import run_training
+
+    with rank_map() as mapping:
+        if mapping:  # other ranks have worked for this one
+            run_training(a.data, a.output or a.data.with_name("law.npz"), say, not a.no_comparison, mapping)
+
+
 def run_report(a):
     from design.report import write_report
 
@@ -222,7 +247,7 @@ def main(arguments=None):
     except (InputError, ConvergenceError, MemoryError) as error:
         # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with it
         # what rank 0 still has to say, at the first failure
-        if all(os.environ.get(name, "0") == "0" for name in MPI_RANK_VARIABLES):
+        if all(os.environ.get(name, "0") == "0" for name in RANK_VARIABLES):
             print(f"pneunet: {error}", file=sys.stderr, flush=True)
         else:
             time.sleep(1.0)

@@ -9,10 +9,13 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 from base.processes import end_with_parent, environment_without_launcher
 
+#: what MPI launchers tell a process of its rank
+RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 # Variables of Open MPI 4 (OMPI_...) and 5 (PRTE_... for its launcher). A value the user has set wins.
 SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -85,3 +88,23 @@ def run(ranks: int, command: list[str]) -> int:
         resume = "; the same command with --resume goes on from the last accepted step" if "solve" in command else ""
         print(f"pneunet run: a rank was stopped by signal {code - 128}{why}{resume}", file=sys.stderr)
     return code
+
+
+@contextmanager
+def rank_map():
+    """A `map` that spreads its calls over the MPI ranks when a launcher has started us, Python's own otherwise.
+
+    On ranks other than 0 it is None: they have done the work by the time the block is entered. Rank 0 hands out and computes
+    nothing itself.
+    """
+    if not any(name in os.environ for name in RANK_VARIABLES):
+        yield map
+        return
+    from mpi4py import MPI
+    from mpi4py.futures import MPICommExecutor
+
+    if MPI.COMM_WORLD.size == 1:
+        yield map
+        return
+    with MPICommExecutor(MPI.COMM_WORLD, root=0) as executor:
+        yield executor and executor.map

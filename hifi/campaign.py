@@ -1,0 +1,154 @@
+"""`pneunet campaign`: cells of both kinds over a space-filling sample of designs, gathered into the data set of the rod law."""
+
+import json
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from base.dataset import UPPER, CellData, columns, write_dataset
+from base.datasheet import datasheet
+from base.errors import InputError
+from base.files import output_directory, write_text
+from base.record import revision, write_record
+from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
+from hifi.agreement import on_rank_0
+from hifi.campaign_case import STATES
+from hifi.campaign_sample import MU
+from hifi.campaignfile import read_campaign
+from hifi.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
+from hifi.cases import CRASHED, OUT_OF_TIME, run_cases
+
+DATA, SHEET = "cells.npz", "cells.md"
+STATUSES = [DONE, STOPPED, REFUSED, ERROR, CRASHED, OUT_OF_TIME, MEMORY]
+#: s between two writings of the data set while it grows
+PAUSE = 60.0
+#: strains that the body's half turns forbid over all, above which a case is not accepted: its mesh is too coarse
+LARGEST_SYMMETRY_DEFECT = 0.02
+
+
+def run_campaign(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False):
+    """Compute the cases of CAMPAIGN.toml that are not finished in `directory`; collective. Returns the CellData on rank 0.
+
+    directory gets cells.npz and its data sheet cells.md, rewritten while it grows, run.json and cases/NAME.
+    """
+    say, directory, started = say if comm.rank == 0 else (lambda text: None), Path(directory), time.perf_counter()
+    campaign = on_rank_0(comm, lambda: read_campaign(path))
+    on_rank_0(comm, lambda: output_directory(directory) and None)
+    counts = Counter((d.kind, d.mesh.name) for d in campaign.designs)
+    for (kind, mesh), number in counts.items():
+        say(f"campaign: {number} {kind} designs on mesh '{mesh}'")
+    gathering = Gathering(campaign, directory)
+    run_cases([d.case for d in campaign.designs], directory / "cases", campaign.limits, comm, say, gathering.add, retry)
+    return on_rank_0(comm, lambda: gathering.finish(comm.size, time.perf_counter() - started, say)) if comm.rank == 0 else None
+
+
+class Gathering:
+    """The records that are known, turned into the data set."""
+
+    def __init__(self, campaign, directory):
+        self.campaign, self.directory = campaign, Path(directory)
+        self.records, self.written = {}, time.monotonic()
+        self._states = {}
+
+    def add(self, case, record):
+        self.records[case.name] = record
+        path = self.directory / "cases" / case.name / STATES
+        self._states[case.name] = json.loads(path.read_text()) if path.exists() else []
+        if time.monotonic() - self.written > PAUSE:
+            self.write()
+
+    def write(self):
+        """Write data set and data sheet of what is known; returns the CellData. InputError when that cannot be written."""
+        data = self.data()
+        try:
+            write_dataset(self.directory / DATA, data)
+            write_text(self.directory / SHEET, datasheet(data))
+        except OSError as error:
+            raise InputError(f"{self.directory}: cannot be written to ({error.strerror or error}): make room there") from None
+        self.written = time.monotonic()
+        return data
+
+    def finish(self, ranks, seconds, say):
+        data = self.write()
+        counts = Counter(record["status"] for record in self.records.values())
+        write_record(self.directory, campaign=self.campaign.table, cases=counts, ranks=ranks, wall_seconds=seconds)
+        say(", ".join(f"{number} {status}" for status, number in counts.items()))
+        say(f"{len(data.kind)} cases, {data.accepted.mean():.1%} accepted, {len(data.case)} states in {self.directory / DATA}; {SHEET}")
+        return data
+
+    def data(self):
+        """The CellData of what is known so far, in order of the sample."""
+        c = self.campaign
+        known = [d for d in c.designs if d.case.name in self.records]
+        rows = {f.name: [] for f in columns()}
+        reasons = {}
+        for i, design in enumerate(known):
+            record = self.records[design.case.name]
+            if record["reason"]:
+                reasons[str(i)] = record["reason"]
+            case = _case_row(c, design, record)
+            states = [_state_row(i, design.segment, s) for s in self._states[design.case.name]]
+            for name, value in case.items():
+                rows[name].append(value)
+            for state in states:
+                for name, value in state.items():
+                    rows[name].append(value)
+        about = {
+            "kinds": list(c.kinds),
+            "meshes": [{"name": m.name, **m.settings} for m in c.meshes],
+            "shape": list(SHAPE),
+            "statuses": STATUSES,
+            "reasons": reasons,
+            "campaign": c.table,
+            "ranges": c.ranges,
+            "largest_symmetry_defect": LARGEST_SYMMETRY_DEFECT,
+            "revisions": sorted({r["revision"] for r in self.records.values() if "revision" in r} or {revision()}),
+        }
+        arrays = {f.name: np.asarray(rows[f.name], f.metadata["type"]).reshape(-1, *f.metadata["shape"]) for f in columns()}
+        return CellData(about, **arrays)
+
+
+def _case_row(campaign, design, record):
+    result = record["result"] or {}
+    mesh = result.get("mesh", {})
+    over_mu = {name: result[name] / MU if result.get(name) is not None else np.nan for name in ("limit_pressure", "first_touch")}
+    return {
+        "kind": campaign.kinds.index(design.kind),
+        "design": design.index,
+        "held_out": design.held_out,
+        "mesh": campaign.meshes.index(design.mesh),
+        "shape": shape_numbers(design.segment),
+        "normal_pitch_mm": normal_pitch(design.segment),
+        "status": STATUSES.index(record["status"]),
+        **over_mu,
+        "cells": mesh.get("cells", 0),
+        "unknowns": mesh.get("unknowns", 0),
+        "seconds": result.get("cpu_seconds", record["seconds"]),
+        "missing": len(result.get("missing", [])),
+    }
+
+
+def _state_row(row, segment, state):
+    """A state of states.json (mm, MPa) without dimension: see base.dataset."""
+    length = normal_pitch(segment)
+    scale = np.array([1, 1, 1, length, length, length])
+    force = MU * length**2
+    wall = state["wall_distance"]
+    return {
+        "case": row,
+        "prescribed": state["kind"] != "free",
+        "pressure": state["pressure"] / MU,
+        "strains": np.array(state["strains"]) * scale,
+        "forces": np.array(state["forces"]) / scale / force,
+        "stiffness": (np.array(state["stiffness"]) / np.outer(scale, scale) / force)[UPPER],
+        "volume": state["volume"] / segment.pitch / length**2,
+        "energy": state["energy"] / segment.pitch / force,
+        "unstable": state["unstable"],
+        "largest_stretch": state["largest_stretch"],
+        "residual": state["residual"],
+        "wall_distance": np.nan if wall is None else wall / length,
+        "contact": state["contact"],
+    }

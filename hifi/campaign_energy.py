@@ -1,0 +1,24 @@
+"""The energy stored in a cell, for the balance with the work of the pressure."""
+
+import ufl
+from dolfinx import fem
+
+from geometry import cad
+from geometry.cell import AIR
+from hifi import compat
+from hifi.cell import AIR_STIFFNESS, DEGREE
+from hifi.materials import energy_density
+
+
+class StoredEnergy:
+    """Everything in the cell's potential but -P V: N mm per pitch. Along free states its change is the integral of P dV."""
+
+    def __init__(self, problem):
+        mesh, material, F = problem.mesh, problem.segment.material, problem.deformation_gradient
+        dx = ufl.Measure("dx", domain=mesh, subdomain_data=problem.cell_tags, metadata={"quadrature_degree": DEGREE})
+        _, p = ufl.split(problem.state)
+        air = AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * ufl.det(F))
+        self._form = compat.compile_form(energy_density(mesh, material, F, p) * dx(cad.BODY) + air * dx(AIR))
+
+    def value(self):
+        return float(fem.assemble_scalar(self._form))

@@ -1,0 +1,167 @@
+"""CAMPAIGN.toml: which designs are computed on which meshes, spread out into the cases of hifi.cases."""
+
+import json
+from dataclasses import asdict, dataclass
+
+from base.errors import InputError
+from base.materials import material_to_table
+from base.processes import Limits
+from base.tables import as_table, number, read_toml, refuse_unknown, to_table
+from geometry.parameters import KINDS
+from hifi.campaign_sample import PLACES, RANGES, prescribed_states, segments
+from hifi.cases import Case
+
+FUNCTION = "hifi.campaign_case:solve_campaign_case"
+#: s; one case
+DEFAULT_TIME = 3600.0
+KEYS = ("kinds", "designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share", "mesh", "ranges", "limits")
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """What geometry.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th designs, from the first, are
+    computed on it.
+
+    prescribed: states at prescribed strains of every prescribed_every-th of those.
+    """
+
+    name: str
+    settings: dict
+    every: int = 1
+    prescribed: int = 0
+    prescribed_every: int = 1
+
+    def prescribed_of(self, index):
+        """How many prescribed states the design has."""
+        return self.prescribed if index // self.every % self.prescribed_every == 0 else 0
+
+
+@dataclass(frozen=True)
+class Design:
+    """One case: what is computed, and what the data set says about where it stands in the sample."""
+
+    kind: str
+    index: int
+    mesh: Mesh
+    held_out: bool
+    segment: object
+    case: Case
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """designs in the order of computing: by index, so that a campaign that is ended half way is a smaller one."""
+
+    designs: tuple
+    kinds: tuple
+    meshes: tuple
+    ranges: dict
+    limits: Limits
+    table: dict
+
+
+def read_campaign(path):
+    """The Campaign in a TOML file; InputError that names key and fix otherwise."""
+    data, where = read_toml(path), str(path)
+    refuse_unknown(data, KEYS, where)
+
+    def value(key, default, low, high, integer=False):
+        v = number(data.get(key, default), key, where, integer=integer)
+        if not low <= v <= high:
+            raise InputError(f"{where}: {key} = {v:g} must lie in {low:g}..{high:g}")
+        return v
+
+    kinds = data.get("kinds", list(KINDS))
+    if not isinstance(kinds, list) or not kinds or any(k not in KINDS for k in kinds):
+        raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting'")
+    count = value("designs", 250, 1, 100_000, integer=True)
+    seed = value("seed", 1, 0, 2**31, integer=True)
+    held_out_every = value("held_out_every", 5, 2, 1000, integer=True)
+    common = {
+        "levels": value("levels", 8, 2, 100, integer=True),
+        "top_pressure": float(value("top_pressure_over_mu", 0.3, 1e-3, 10)),
+        "limit_share": float(value("limit_share", 0.9, 0.1, 0.99)),
+    }
+    meshes = _meshes(data.get("mesh", [{"name": "coarse", "mesh_size_mm": 2.0}]), where)
+    ranges = _ranges(as_table(data.get("ranges", {}), f"{where} [ranges]"), kinds, f"{where} [ranges]")
+    limits = as_table(data.get("limits", {}), f"{where} [limits]")
+    refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
+    designs = []
+    for kind in kinds:
+        held = prescribed_states(kind, count, max(m.prescribed for m in meshes), seed)
+        try:
+            bodies = segments(kind, ranges[kind], count, seed)
+        except InputError as error:
+            raise InputError(f"{where} [ranges.{kind}]: they hold impossible bodies: {error}") from None
+        for index, segment in enumerate(bodies):
+            for mesh in meshes:
+                if index % mesh.every == 0:
+                    case = _case(kind, index, mesh, segment, held[index][: mesh.prescribed_of(index)], common)
+                    designs.append(Design(kind, index, mesh, is_held_out(index, held_out_every), segment, case))
+    designs.sort(key=lambda d: d.index)
+    table = {"designs": count, "seed": seed, "held_out_every": held_out_every, **common}
+    return Campaign(
+        tuple(designs), tuple(kinds), meshes, ranges, Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")), table
+    )
+
+
+def is_held_out(index, every):
+    """Every n-th design, never the first: chosen by index alone, before anything is computed."""
+    return index % every == every - 1
+
+
+def _case(kind, index, mesh, segment, prescribed, common):
+    inputs = {
+        "segment": to_table(segment),
+        "material": material_to_table(segment.material),
+        "mesh": mesh.settings,
+        **common,
+        "prescribed": [asdict(p) for p in prescribed],
+    }
+    # through JSON, so that inputs are what the record on disk will hold
+    return Case(FUNCTION, json.loads(json.dumps(inputs)), f"{kind} {index} {mesh.name}")
+
+
+def _meshes(rows, where):
+    if not isinstance(rows, list) or not rows:
+        raise InputError(f"{where}: meshes are written [[mesh]], with double brackets")
+    meshes = []
+    for i, row in enumerate(rows, start=1):
+        at = f"{where} [[mesh]] {i}"
+        refuse_unknown(row, ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every"], at)
+        for key in ("name", "mesh_size_mm"):
+            if key not in row:
+                raise InputError(f"{at}: key '{key}' is missing")
+        settings = {}
+        for key in ("mesh_size_mm", "edge_size_mm"):
+            if key in row:
+                settings[key] = float(number(row[key], key, at))
+                if not 0.02 <= row[key] <= 20:
+                    raise InputError(f"{at}: {key} = {row[key]:g} must lie in 0.02..20")
+        counts = []
+        for key, default, low, high in (("every", 1, 1, 10_000), ("prescribed", 0, 0, PLACES), ("prescribed_every", 1, 1, 10_000)):
+            counts.append(number(row.get(key, default), key, at, integer=True))
+            if not low <= counts[-1] <= high:
+                raise InputError(f"{at}: {key} = {counts[-1]} must lie in {low}..{high}")
+        meshes.append(Mesh(str(row["name"]), settings, *counts))
+    if len({m.name for m in meshes}) < len(meshes):
+        raise InputError(f"{where}: two [[mesh]] have the same name")
+    return tuple(meshes)
+
+
+def _ranges(table, kinds, where):
+    """{kind: {variable: (low, high)}}: the default ones, replaced by [ranges.KIND]."""
+    refuse_unknown(table, KINDS, where)
+    out = {}
+    for kind in kinds:
+        own = as_table(table.get(kind, {}), f"{where}.{kind}")
+        refuse_unknown(own, RANGES[kind], f"{where}.{kind}")
+        out[kind] = dict(RANGES[kind])
+        for key, both in own.items():
+            if not isinstance(both, list) or len(both) != 2:
+                raise InputError(f"{where}.{kind}: {key} must be [low, high]")
+            low, high = (float(number(v, key, f"{where}.{kind}")) for v in both)
+            if not low < high:
+                raise InputError(f"{where}.{kind}: {key} = [{low:g}, {high:g}]: write the lower value first")
+            out[kind][key] = (low, high)
+    return out

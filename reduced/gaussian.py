@@ -1,0 +1,172 @@
+"""Gaussian processes: smooth functions of several inputs from few points, with their uncertainty.
+
+Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x')/scales|^2 / 2) + TREND (1 + x.x'), a smooth function
+and a plane whose coefficients are hardly restricted; noise on the observations, and noise that those of a group (the states of one
+mesh) have in common. Scales and noises are shared by the outputs and maximise the likelihood, with each output's variance profiled
+out (Rasmussen & Williams 2006, ch. 2 and 5). Many observations are summed up on `inducing` points of their own (deterministic
+training conditional, ch. 8.3), exactly when all of them are taken.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, cholesky, qr, solve_triangular
+from scipy.optimize import minimize
+
+#: prior variance of the plane's coefficients over that of the smooth function
+TREND = 100.0
+LOG_NOISE = (np.log(1e-6), np.log(1e-1))
+LOG_SCALE = (np.log(0.3), np.log(100.0))
+JITTER = 1e-9
+
+
+@dataclass(frozen=True)
+class GaussianProcess:
+    """Means of p outputs at inputs of d numbers, which are shifted by `shift` and divided by `width` first.
+
+    scales (d,): of the kernel, in those units; points (m, d): in units of the scales too; weights (m + 1 + d, p): of the kernels
+    at the points, the constant and the slopes. root (m + 1 + d, same): triangular factor for the deviation, as if every
+    output were as noisy as the first; variance (p,): each output's prior variance.
+    """
+
+    shift: np.ndarray
+    width: np.ndarray
+    scales: np.ndarray
+    points: np.ndarray
+    weights: np.ndarray
+    root: np.ndarray
+    variance: np.ndarray
+    noise: float
+    common_noise: float
+
+    @cached_property
+    def _kernel_root(self):
+        return cholesky(_kernel(self.points, self.points) + JITTER * np.eye(len(self.points)), lower=True)
+
+    def __call__(self, x, derivative=False):
+        """(n, p) at inputs (n, d); with `derivative` also (n, p, d)."""
+        z = (x - self.shift) / self.width
+        a, m = z / self.scales, len(self.points)
+        kernel, (smooth, constant, slopes) = _kernel(a, self.points), np.split(self.weights, [m, m + 1])
+        curved = kernel @ smooth
+        mean = curved + constant + z @ slopes
+        if not derivative:
+            return mean
+        # d k(a, b)/d a = k (b - a)
+        p = smooth.shape[1]
+        first = kernel @ (smooth[:, :, None] * self.points[:, None, :]).reshape(m, -1)
+        slope = first.reshape(len(x), p, -1) - curved[:, :, None] * a[:, None, :]
+        return mean, (slope / self.scales + slopes.T) / self.width
+
+    def deviation(self, x):
+        """(n, p) standard deviation of the outputs, without noise."""
+        z = (x - self.shift) / self.width
+        kernel = _kernel(z / self.scales, self.points)
+        basis = np.hstack([kernel, np.ones((len(x), 1)), z])
+        missed = 1 - (solve_triangular(self._kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
+        known = self.noise * (solve_triangular(self.root, basis.T, trans="T") ** 2).sum(axis=0)
+        return np.sqrt((known + np.maximum(missed, 0))[:, None] * self.variance)
+
+
+def _kernel(a, b):
+    squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
+    return np.exp(-0.5 * np.maximum(squares, 0))
+
+
+def fit(x, y, group, trust=None, most=500, inducing=1000, seed=0, like=None):
+    """The GaussianProcess through y (n, p) at x (n, d); `like`: another one whose scales and noise are taken as they are.
+
+    group (n,): equal where noise is common. trust (n, p), the same within a group: what noises are divided by, for outputs that
+    are quotients by something small.
+    Scales are found on at most `most` of the observations.
+    """
+    trust = np.ones(y.shape) if trust is None else trust
+    shift, width = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
+    z, order = (x - shift) / width, np.random.default_rng(seed).permutation(len(x))
+    if like is not None:
+        shift, width = like.shift, like.width
+        return _condition((x - shift) / width, y, group, trust, order[:inducing], shift, width, like.scales, like.noise, like.common_noise)
+    some = order[:most]
+    data = [(y[np.ix_(some, g)], trust[some, g[0]]) for g in _alike(trust)]
+    centred = [(v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum(), 1 / t) for v, t in data]
+    same = group[some][:, None] == group[some]
+    found = minimize(
+        _misfit,
+        np.append(np.full(z.shape[1], np.log(3.0)), np.log([1e-4, 1e-4])),
+        (z[some], centred, same),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[LOG_SCALE] * z.shape[1] + [LOG_NOISE] * 2,
+        options={"maxiter": 100},
+    )
+    return _condition(z, y, group, trust, order[:inducing], shift, width, np.exp(found.x[:-2]), *np.exp(found.x[-2:]).tolist())
+
+
+def _alike(trust):
+    """Columns of equal trust, as lists."""
+    groups = {}
+    for j, column in enumerate(trust.T):
+        groups.setdefault(column.tobytes(), []).append(j)
+    return list(groups.values())
+
+
+def _condition(z, y, group, trust, chosen, shift, width, scales, noise, common_noise):
+    points, (d, p) = z[chosen] / scales, (z.shape[1], y.shape[1])
+    m = len(points)
+    basis = np.hstack([_kernel(z / scales, points), np.ones((len(z), 1)), z])
+    kernel_root = cholesky(_kernel(points, points) + JITTER * np.eye(m), lower=True)
+    prior = np.zeros((m + 1 + d, m + 1 + d))
+    prior[:m, :m], prior[m:, m:] = kernel_root.T, np.eye(1 + d) / np.sqrt(TREND)
+    weights, variance, roots = np.zeros((m + 1 + d, p)), np.zeros(p), []
+    white = _whitener(group, common_noise / noise)
+    for columns in _alike(trust):
+        t = trust[:, columns[0]][:, None]
+        shifted = (t**2 * y[:, columns]).sum(axis=0) / (t**2).sum()
+        left, right = white(t * basis), white(t * (y[:, columns] - shifted))
+        q, r = qr(np.vstack([left, np.sqrt(noise) * prior]), mode="economic")
+        w = solve_triangular(r, q[: len(z)].T @ right)
+        variance[columns] = (((right - left @ w) ** 2).sum(axis=0) / noise + ((prior @ w) ** 2).sum(axis=0)) / len(z)
+        w[m] += shifted
+        weights[:, columns] = w
+        roots.append(r)
+    return GaussianProcess(shift, width, scales, points, weights, roots[0], variance, noise, common_noise)
+
+
+def _whitener(group, ratio):
+    """(n, p) -> (n, p): times the inverse root of I + ratio (1 where rows are of one group)."""
+    _, index, count = np.unique(group, return_inverse=True, return_counts=True)
+    part = 1 - 1 / np.sqrt(1 + ratio * count)
+
+    def white(a):
+        sums = np.zeros((len(count), a.shape[1]))
+        np.add.at(sums, index, a)
+        return a - (part / count)[index, None] * sums[index]
+
+    return white
+
+
+def _misfit(log, z, data, same):
+    """Minus the log likelihood, each output's variance profiled out, and its gradient by the logarithms of scales and noises."""
+    n, scales, noises = len(z), np.exp(log[:-2]), np.exp(log[-2:])
+    a = z / scales
+    kernel = _kernel(a, a)
+    prior = kernel + TREND * (1 + z @ z.T)
+    value, outer_sum, by_noise = 0.0, np.zeros((n, n)), np.zeros(2)
+    for y, doubt in data:
+        p = y.shape[1]
+        noise = np.outer(doubt, doubt) * (noises[0] * np.eye(n) + noises[1] * same)
+        try:
+            factor = cho_factor(prior + noise, lower=True)
+        except np.linalg.LinAlgError:
+            return 1e10, np.zeros(len(log))
+        weights = cho_solve(factor, y)
+        variance = (y * weights).sum(axis=0) / n
+        value += n / 2 * np.log(variance).sum() + p * np.log(np.diag(factor[0])).sum()
+        outer = p / 2 * cho_solve(factor, np.eye(n)) - (weights / variance) @ weights.T / 2
+        outer_sum += outer
+        doubted = outer * np.outer(doubt, doubt)
+        by_noise += noises * [np.trace(doubted), doubted[same].sum()]
+    s = outer_sum * kernel
+    by_scale = 2 * (s.sum(axis=1) @ a**2 - (a * (s @ a)).sum(axis=0))
+    return value, np.append(by_scale, by_noise)

@@ -1,0 +1,249 @@
+"""The trained law of a rod's sections: free strains, stiffness and enthalpy of cells, learned from finite elements.
+
+`RodLaw` knows both kinds of segment; `RodLaw.of(segment)` is the law of one of them in mm and MPa, with what a rod asks:
+free_strains(P), psi(q, P), force(q, P), stiffness(q, P). Everything else is without dimension (base.dataset). Trained by
+`pneunet train` (reduced.training); numpy and scipy alone.
+"""
+
+import json
+from dataclasses import dataclass, fields
+from functools import lru_cache
+
+import numpy as np
+
+from base.errors import InputError
+from base.files import atomic_path
+from base.materials import NeoHookean
+from base.strains import RodStrains
+from geometry.parameters import TWISTING
+from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
+from reduced.gaussian import GaussianProcess
+from reduced.law_coordinates import LENGTHS, Coordinates, cosine
+from reduced.potential import Anharmonic, whitening
+
+SCHEMA = "pneunet-law-1"
+#: a length that the sample ties to another may differ from it by so much of itself before the law says so
+TIE_TOLERANCE = 0.02
+#: lowest P/mu: the free strains are divided by it
+LOWEST = 1e-9
+
+
+@dataclass(frozen=True)
+class KindLaw:
+    """The law of one kind. strains, stiffness: GaussianProcess of Coordinates; quantile (6,): what a standard deviation of each
+    strain is multiplied by for a 90 % interval; low, high (d,): range of the inputs; doubt: largest deviation of the leading
+    strain that counts as known; level: the mesh that is predicted, by its place among those trained on, the finest last."""
+
+    kind: str
+    strains: GaussianProcess
+    stiffness: GaussianProcess
+    anharmonic: Anharmonic
+    quantile: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    doubt: float
+    level: int = 0
+
+    @property
+    def coordinates(self):
+        return Coordinates(self.kind)
+
+    def _inputs(self, shape, pressure):
+        return self.coordinates.inputs(shape, pressure, self.level)
+
+    def free_strains(self, shape, pressure):
+        """(n, 6) free strains of shape numbers (n, 13) at P/mu (n,)."""
+        pressure = np.maximum(pressure, LOWEST)
+        co = self.coordinates
+        return co.strains(shape, pressure, self.strains(self._inputs(shape, pressure)))
+
+    def free_strains_and_slopes(self, shape, pressure):
+        """(strains (n, 6), slopes (n, 6, 14)): derivatives by the 13 shape numbers (the angle in degrees) and P/mu."""
+        pressure = np.maximum(pressure, LOWEST)
+        co = self.coordinates
+        learned, slopes = self.strains(self._inputs(shape, pressure), derivative=True)
+        return co.strains_and_slopes(shape, pressure, learned, slopes)
+
+    def free_stiffness(self, shape, pressure):
+        """(n, 6, 6) tangent stiffness of the free states."""
+        co = self.coordinates
+        return co.stiffness(shape, self.stiffness(self._inputs(shape, pressure)))
+
+    def half_width(self, shape, pressure):
+        """(n, 6) half of the 90 % interval of each free strain."""
+        pressure = np.maximum(pressure, LOWEST)
+        return self.quantile * self.spread(shape, pressure)
+
+    def spread(self, shape, pressure):
+        """(n, 6) standard deviation of the free strains as the Gaussian process sees it."""
+        co = self.coordinates
+        x = self._inputs(shape, pressure)
+        return co.spread(shape, pressure, self.strains(x), self.strains.deviation(x))
+
+    def outside(self, shape, pressure):
+        """(n,) bool: where the law has not been taught."""
+        x = self._inputs(shape, np.maximum(pressure, LOWEST))
+        box = ((x < self.low - 1e-9) | (x > self.high + 1e-9)).any(axis=1)
+        return box | (self.strains.deviation(x)[:, 0] > self.doubt)
+
+
+@dataclass(frozen=True)
+class RodLaw:
+    """kinds: {kind: KindLaw}; about: how it was trained."""
+
+    kinds: dict
+    about: dict
+    name = "trained"
+
+    def of(self, segment):
+        """The SectionLaw of a Segment; InputError for a kind that it was not taught."""
+        if segment.kind not in self.kinds:
+            raise InputError(f"kind = '{segment.kind}': this law was trained on {', '.join(self.kinds)} segments only")
+        return SectionLaw(self.kinds[segment.kind], shape_numbers(segment), normal_pitch(segment), segment.material.mu, _ties(segment))
+
+    def strains(self, segment, pressure):
+        """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa (a reduced.model.SegmentLaw)."""
+        q = self.of(segment).free_strains(np.asarray(pressure, float))
+        return RodStrains(q[..., :3], q[..., 3:])
+
+
+@dataclass(frozen=True, eq=False)
+class SectionLaw:
+    """The law of one Segment's section in mm, N and MPa; q (..., 6) = (e, k), P a number or (...,)."""
+
+    law: KindLaw
+    shape: np.ndarray
+    length: float
+    mu: float
+    remarks: tuple = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "_scale", np.array([1, 1, 1, self.length, self.length, self.length]))
+        object.__setattr__(self, "_known", lru_cache(maxsize=64)(self._free_state))
+
+    def _free_state(self, *pressures):
+        """(free strains (n, 6), M (n, 6, 6), D1 (n,)) without dimension at pressures in MPa."""
+        shape, p = self._rows(pressures)
+        return self.law.free_strains(shape, p), *whitening(self.law.kind, self.law.free_stiffness(shape, p))
+
+    def _rows(self, P):
+        p = np.atleast_1d(np.asarray(P, float)).ravel() / self.mu
+        return np.broadcast_to(self.shape, (len(p), len(self.shape))), p
+
+    def free_strains(self, P):
+        """(..., 6) minimiser of psi."""
+        return (self.law.free_strains(*self._rows(P)) / self._scale).reshape(*np.shape(P), 6)
+
+    def half_width(self, P):
+        """(..., 6) half of the 90 % interval of each free strain."""
+        return (self.law.half_width(*self._rows(P)) / self._scale).reshape(*np.shape(P), 6)
+
+    def doubts(self, P):
+        """Reasons, as text, not to trust the law at this pressure; () when there are none."""
+        outside = self.law.outside(*self._rows(P)).any()
+        return self.remarks + (("design or pressure lies outside the data that the law was trained on",) if outside else ())
+
+    def _state(self, q, P):
+        """(shape of the answer, v (n, 6), M (n, 6, 6), D1 (n,), c (n,))."""
+        lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(P))
+        q = np.broadcast_to(q, (*lead, 6)).reshape(-1, 6)
+        if np.ndim(P):
+            pressures, back = np.unique(np.asarray(P, float), return_inverse=True)
+            i = np.broadcast_to(back.reshape(np.shape(P)), lead).ravel()
+            free, M, D1 = (a[i] for a in self._free_state(*pressures))
+        else:
+            free, M, D1 = self._known(float(P))
+        v = (M @ (q * self._scale - free)[:, :, None])[:, :, 0]
+        return lead, v, M, D1, np.broadcast_to(cosine(self.shape[None]), len(q))
+
+    def psi(self, q, P):
+        """(...,) enthalpy per undeformed length, N; 0 at the free state."""
+        lead, v, _, D1, c = self._state(q, P)
+        return (self.mu * self.length**2 * D1 * ((v**2).sum(axis=1) / 2 + self.law.anharmonic.value(v, c))).reshape(lead)
+
+    def force(self, q, P):
+        """(..., 6) gradient of psi: force (N) and moment (N mm) in the section frame."""
+        lead, v, M, D1, c = self._state(q, P)
+        by_v = D1[:, None] * (v + self.law.anharmonic.gradient(v, c))
+        force = (by_v[:, None, :] @ M)[:, 0]
+        return (self.mu * self.length**2 * force * self._scale).reshape(*lead, 6)
+
+    def stiffness(self, q, P):
+        """(..., 6, 6) Hessian of psi, N, N mm and N mm2."""
+        lead, v, M, D1, c = self._state(q, P)
+        by_v = D1[:, None, None] * (np.eye(6) + self.law.anharmonic.hessian(v, c))
+        K = np.swapaxes(M, 1, 2) @ by_v @ M
+        return (self.mu * self.length**2 * K * np.outer(self._scale, self._scale)).reshape(*lead, 6, 6)
+
+
+def _ties(segment):
+    """What the sample ties together and this segment does not."""
+    s, shell = segment, segment.top_wall
+    ties = [("side_wall", s.side_wall, shell)]
+    if s.kind != TWISTING:
+        ties += [("roof", s.roof, shell), ("cavity_floor", s.cavity_floor, s.channel_height / 2)]
+    remarks = [
+        f"{name}_mm = {value:g} where the law was trained on {tied:g} (tied to other dimensions)"
+        for name, value, tied in ties
+        if abs(value - tied) > TIE_TOLERANCE * abs(tied)
+    ]
+    if s.layer_thickness:
+        remarks.append("the law was trained without a bottom layer")
+    if not isinstance(s.material, NeoHookean):
+        remarks.append(f"the law was trained on neo-Hookean material, not {s.material.law}: its initial modulus is taken")
+    return tuple(remarks)
+
+
+# ---- files
+
+
+def write_law(path, law):
+    """Write a RodLaw (.npz); numbers for deviations in single precision."""
+    arrays = {}
+    for kind, k in law.kinds.items():
+        for name in ("strains", "stiffness"):
+            for f in fields(GaussianProcess):
+                value = np.asarray(getattr(getattr(k, name), f.name))
+                if f.name == "root":  # of the stiffness nobody asks the deviation
+                    value = value[np.triu_indices(len(value))].astype("f4")[: 0 if name == "stiffness" else None]
+                arrays[f"{kind}/{name}/{f.name}"] = value
+        arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
+        arrays |= {f"{kind}/coefficients": k.anharmonic.coefficients, f"{kind}/reach": np.asarray(k.anharmonic.reach)}
+    about = {"schema": SCHEMA, "kinds": list(law.kinds), "shape": list(SHAPE), "lengths": LENGTHS, **law.about}
+    with atomic_path(path) as temporary:
+        with open(temporary, "wb") as stream:
+            np.savez(stream, about=np.frombuffer(json.dumps(about).encode(), np.uint8), **arrays)
+
+
+def read_law(path):
+    """The RodLaw in a file; InputError when it is none or of another version."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            about = json.loads(bytes(stored["about"]))
+            if about.get("schema") != SCHEMA:
+                raise InputError(f"{path}: schema '{about.get('schema')}' is not '{SCHEMA}': make it again with pneunet train")
+            return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file: make it with pneunet train") from None
+    except (KeyError, ValueError, OSError) as error:
+        raise InputError(f"{path}: not a trained law ({error}): make it again with pneunet train") from None
+
+
+def _triangle(flat):
+    """Upper triangular matrix of its entries, row by row."""
+    n = round((np.sqrt(8 * len(flat) + 1) - 1) / 2)
+    full = np.zeros((n, n))
+    full[np.triu_indices(n)] = flat
+    return full
+
+
+def _read_kind(stored, kind):
+    processes = {}
+    for name in ("strains", "stiffness"):
+        values = {f.name: stored[f"{kind}/{name}/{f.name}"] for f in fields(GaussianProcess)}
+        values |= {name: float(values[name]) for name in ("noise", "common_noise")} | {"root": _triangle(values["root"])}
+        processes[name] = GaussianProcess(**values)
+    plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
+    anharmonic = Anharmonic(kind, stored[f"{kind}/coefficients"], float(stored[f"{kind}/reach"]))
+    doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])
+    return KindLaw(kind, **processes, anharmonic=anharmonic, **plain, doubt=doubt, level=level)

@@ -1,0 +1,151 @@
+"""What a trained law learns instead of strains and stiffness: smooth numbers of order one that keep the body's symmetries.
+
+All without dimension (base.dataset): pressure P/mu, strains q = (e, k l). With c = cos(angle), mirror images have opposite c, and
+every quantity is even or odd in c: e2, k1 and k3 change sign in the mirror. Odd ones are c times an even function, which is
+learned as a function of c^2 and the logarithms of the lengths. The free strains are led by the one that never vanishes, the
+curvature k2 of a one-sided, the stretch of a twisting segment, as log(strain / P); the others are divided by it. Pressures too
+enter by their logarithm, as the lengths do: what makes a design soft is a product of powers. The stiffness is L D L^T by the
+blocks that the half turns of the body leave: unit lower triangular L and log D.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.parameters import ONE_SIDED, TWISTING
+from geometry.shape_numbers import SHAPE
+
+#: of (e1, e2, e3, k1, k2, k3) in the mirror y -> -y
+MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+REST = np.eye(6)[0]
+#: P/mu below which the response is linear anyway: the logarithm is taken of their sum
+SMALL_PRESSURE = 0.01
+#: Segment's lengths that the sample varies on their own
+LENGTHS = {
+    ONE_SIDED: ("width", "chamber_height", "cavity_thickness", "wall", "top_wall", "base_thickness", "channel_width", "channel_height"),
+    TWISTING: (
+        *("width", "chamber_height", "cavity_thickness", "wall", "top_wall", "roof", "channel_width", "channel_height"),
+        "cavity_floor",
+    ),
+}
+#: kind -> (index of the leading strain, of the others that are not zero)
+LEADING = {ONE_SIDED: (4, (0, 1, 3)), TWISTING: (0, (3,))}
+#: kind -> blocks of the stiffness
+BLOCKS = {ONE_SIDED: ((0, 1, 3, 4), (2, 5)), TWISTING: ((0, 3), (1, 4), (2, 5))}
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The transformations for one kind of segment."""
+
+    kind: str
+
+    def inputs(self, shape, pressure, level):
+        """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a number."""
+        columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
+        return np.column_stack(
+            [cosine(shape) ** 2, np.log(shape[:, columns]), np.log(pressure + SMALL_PRESSURE), np.broadcast_to(level, len(shape))]
+        )
+
+    # ---- free strains
+    @property
+    def strain_parity(self):
+        """(p,) of the learned strains: 1 even, -1 odd."""
+        lead, others = LEADING[self.kind]
+        return MIRROR[[lead, *others]]
+
+    def learned_strains(self, shape, pressure, strains):
+        """(n, p) from strains (n, 6) at P > 0."""
+        lead, others = LEADING[self.kind]
+        q = strains - REST
+        ratios = q[:, others] / q[:, [lead]] / odd(self.strain_parity[1:], cosine(shape))
+        return np.column_stack([np.log(q[:, lead] / pressure), ratios])
+
+    def strains(self, shape, pressure, learned):
+        """(n, 6) back from (n, p)."""
+        lead, others = LEADING[self.kind]
+        size = np.exp(learned[:, 0]) * pressure
+        q = np.zeros((len(learned), 6))
+        q[:, lead] = size
+        q[:, others] = learned[:, 1:] * odd(self.strain_parity[1:], cosine(shape)) * size[:, None]
+        return q + REST
+
+    def spread(self, shape, pressure, learned, deviation):
+        """(n, 6) standard deviation of the strains from that of the learned numbers (n, p), taken as independent."""
+        lead, others = LEADING[self.kind]
+        size, out = np.exp(learned[:, 0]) * pressure, np.zeros((len(learned), 6))
+        out[:, lead] = size * deviation[:, 0]
+        c = np.abs(odd(self.strain_parity[1:], cosine(shape)))
+        out[:, others] = size[:, None] * c * np.hypot(deviation[:, 1:], learned[:, 1:] * deviation[:, :1])
+        return out
+
+    def strains_and_slopes(self, shape, pressure, learned, slopes):
+        """(strains (n, 6), their derivatives (n, 6, 14) by the shape numbers and P/mu) from those (n, p, d) of the learned."""
+        lead, others = LEADING[self.kind]
+        n, c = len(learned), cosine(shape)
+        by_angle = -np.radians(1.0) * np.sin(np.radians(shape[:, 0]))  # dc/d(degree)
+        columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
+        by = np.zeros((n, learned.shape[1], len(SHAPE) + 1))
+        by[:, :, 0] = slopes[:, :, 0] * (2 * c * by_angle)[:, None]
+        by[:, :, columns] = slopes[:, :, 1:-2] / shape[:, None, columns]
+        by[:, :, -1] = slopes[:, :, -2] / (pressure + SMALL_PRESSURE)[:, None]
+        size = np.exp(learned[:, 0]) * pressure
+        by_size = size[:, None] * by[:, 0]
+        by_size[:, -1] += size / pressure
+        q, out = self.strains(shape, pressure, learned), np.zeros((n, 6, len(SHAPE) + 1))
+        out[:, lead] = by_size
+        for j, (i, parity) in enumerate(zip(others, self.strain_parity[1:]), start=1):
+            factor = c if parity < 0 else np.ones(n)
+            out[:, i] = (factor * size)[:, None] * by[:, j] + (factor * learned[:, j])[:, None] * by_size
+            if parity < 0:
+                out[:, i, 0] += by_angle * learned[:, j] * size
+        return q, out
+
+    # ---- stiffness
+    @property
+    def stiffness_parity(self):
+        return np.concatenate([self._parity(block) for block in BLOCKS[self.kind]])
+
+    @staticmethod
+    def _parity(block):
+        i, j = np.tril_indices(len(block), -1)
+        s = MIRROR[list(block)]
+        return np.concatenate([np.ones(len(block)), s[i] * s[j]])
+
+    def learned_stiffness(self, shape, matrices):
+        """(n, p) from stiffness (n, 6, 6), of which what the symmetries forbid is left out. Not positive definite: nan."""
+        c, out = cosine(shape), []
+        for block in BLOCKS[self.kind]:
+            K = matrices[:, block][:, :, block]
+            good = np.linalg.eigvalsh(K)[:, 0] > 0
+            factor = np.full(K.shape, np.nan)
+            factor[good] = np.linalg.cholesky(K[good])
+            diagonal = np.diagonal(factor, axis1=1, axis2=2)
+            i, j = np.tril_indices(len(block), -1)
+            parity = self._parity(block)[len(block) :]
+            out += [2 * np.log(diagonal), (factor / diagonal[:, None, :])[:, i, j] / odd(parity, c)]
+        return np.hstack(out)
+
+    def stiffness(self, shape, learned):
+        """(n, 6, 6), symmetric and positive definite, back from (n, p)."""
+        c, K, start = cosine(shape), np.zeros((len(learned), 6, 6)), 0
+        for block in BLOCKS[self.kind]:
+            b = len(block)
+            i, j = np.tril_indices(b, -1)
+            parity = self._parity(block)[b:]
+            L = np.tile(np.eye(b), (len(learned), 1, 1))
+            L[:, i, j] = learned[:, start + b : start + b + len(i)] * odd(parity, c)
+            D = np.exp(learned[:, start : start + b])
+            K[np.ix_(range(len(K)), block, block)] = (L * D[:, None, :]) @ np.swapaxes(L, 1, 2)
+            start += b + len(i)
+        return K
+
+
+def cosine(shape):
+    """(n,) cos(angle) of shape numbers (n, 13)."""
+    return np.cos(np.radians(shape[:, 0]))
+
+
+def odd(parity, c):
+    """(n, p): c where parity (p,) is -1, 1 where it is 1."""
+    return np.where(parity < 0, c[:, None], 1.0)

@@ -1,0 +1,81 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from base.dataset import SCHEMA, UPPER, CellData, columns, read_dataset, write_dataset
+from base.datasheet import datasheet
+from base.errors import InputError
+
+
+@pytest.fixture
+def data():
+    """Three cases: P V of a linear spring, one that bends to a forbidden side, one that was ended; all with four free states."""
+    P = np.array([0.0, 0.1, 0.2, 0.3])
+    about = {
+        "kinds": ["one-sided", "twisting"],
+        "meshes": [{"name": "coarse", "mesh_size_mm": 2.0}],
+        "shape": [f"s{i}" for i in range(13)],
+        "statuses": ["done", "crashed"],
+        "reasons": {"2": "ended by signal SIGSEGV"},
+        "campaign": {"designs": 3},
+        "ranges": {"one-sided": {"wall_mm": [0.8, 1.6]}, "twisting": {"wall_mm": [0.8, 1.6]}},
+        "largest_symmetry_defect": 0.02,
+        "revisions": ["abc"],
+    }
+    n, m = 3, 8
+    sizes = {"cases": n, "states": m}
+    arrays = {f.name: np.zeros((sizes[f.metadata["of"]], *f.metadata["shape"]), f.metadata["type"]) for f in columns()}
+    arrays["status"][2] = 1
+    arrays["case"][:] = np.repeat([0, 1], 4)
+    arrays["pressure"][:] = np.tile(P, 2)
+    arrays["volume"][:] = 2.0 + 5.0 * np.tile(P, 2)
+    arrays["energy"][:] = 5.0 / 2 * np.tile(P, 2) ** 2
+    arrays["strains"][:, 0] = 1.0
+    arrays["strains"][:, 4] = np.tile(P, 2)
+    arrays["strains"][4:, 5] = 0.1 * P
+    return CellData(about, **arrays)
+
+
+def test_a_file_gives_back_what_was_written(tmp_path, data):
+    matrix = np.random.default_rng(1).random((8, 6, 6))
+    data = replace(data, stiffness=(matrix + matrix.transpose(0, 2, 1))[:, UPPER[0], UPPER[1]].astype("f4"))
+    write_dataset(tmp_path / "cells.npz", data)
+    again = read_dataset(tmp_path / "cells.npz")
+    for f in columns():
+        assert (getattr(again, f.name) == getattr(data, f.name)).all()
+    assert again.about == {"schema": SCHEMA, **data.about}
+    assert again.matrices == pytest.approx(matrix + matrix.transpose(0, 2, 1), rel=1e-6)
+
+
+def test_a_case_is_accepted_when_it_is_done_stable_and_symmetric(data):
+    assert data.symmetry_defect[:2] == pytest.approx([0, 0.1 / np.hypot(1, 0.1)])
+    assert data.accepted.tolist() == [True, False, False]
+    data.unstable[3] = 1
+    assert not data.accepted.any()
+
+
+def test_energy_defect_is_what_the_work_of_the_pressure_misses(data):
+    assert data.energy_defect()[:2] == pytest.approx([0, 0], abs=1e-6)
+    data.energy[3] *= 1.01
+    assert data.energy_defect()[0] == pytest.approx(0.01, rel=1e-4)
+    assert np.isnan(data.energy_defect()[2])
+
+
+def test_the_data_sheet_names_what_was_not_accepted(data):
+    text = datasheet(data)
+    assert "| coarse (mesh_size_mm 2) | 3 | 1 (33.3%) |" in text
+    assert "crashed: ended by signal SIGSEGV" in text and "symmetry defect 10.0%" in text
+
+
+def test_another_schema_and_another_file_are_refused(tmp_path, data):
+    path = tmp_path / "cells.npz"
+    np.savez(path, about=np.frombuffer(json.dumps({"schema": "other"}).encode(), np.uint8))
+    with pytest.raises(InputError, match="schema 'other'"):
+        read_dataset(path)
+    path.write_text("no archive")
+    with pytest.raises(InputError, match="not a data set"):
+        read_dataset(path)
+    with pytest.raises(InputError, match="'volume' has shape"):
+        replace(data, volume=np.zeros(3))

@@ -1,0 +1,105 @@
+"""The sample of a campaign and its prescribed strains; the command itself is in tests/pneunet/test_campaign.py."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from base.errors import InputError
+from geometry.parameters import ONE_SIDED, TWISTING
+from geometry.shape_numbers import SHAPE, shape_numbers
+from hifi.campaign_case import first_touch, prescribed_change
+from hifi.campaign_sample import RANGES, prescribed_states, segments
+from hifi.campaignfile import read_campaign
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="nothing parallel in it")
+
+
+def campaign(tmp_path, text):
+    (tmp_path / "c.toml").write_text(text)
+    return read_campaign(tmp_path / "c.toml")
+
+
+def test_more_designs_keep_the_first_ones(tmp_path):
+    few, many = (campaign(tmp_path, f"designs = {n}\nheld_out_every = 3") for n in (5, 20))
+    names = {d.case.name for d in many.designs}
+    assert len(few.designs) == 10 and {d.case.name for d in few.designs} < names and len(names) == 40
+    assert {d.index for d in many.designs if d.held_out} == {2, 5, 8, 11, 14, 17}
+    assert [d.index for d in many.designs] == sorted(d.index for d in many.designs)  # ended half way it is a smaller one
+
+
+def test_prescribed_states_and_fine_meshes_are_for_some_designs(tmp_path):
+    text = """designs = 13
+kinds = ["twisting"]
+[[mesh]]
+name = "coarse"
+mesh_size_mm = 2
+prescribed = 2
+prescribed_every = 3
+[[mesh]]
+name = "fine"
+mesh_size_mm = 1
+every = 6
+"""
+    designs = campaign(tmp_path, text).designs
+    coarse, fine = ([d for d in designs if d.mesh.name == name] for name in ("coarse", "fine"))
+    assert [d.index for d in fine] == [0, 6, 12] and [d.index for d in coarse] == list(range(13))
+    assert [len(d.case.inputs["prescribed"]) for d in coarse] == [2, 0, 0] * 4 + [2]
+    assert not any(d.case.inputs["prescribed"] for d in fine)
+
+
+@pytest.mark.parametrize("kind", (ONE_SIDED, TWISTING))
+def test_designs_fill_their_ranges_evenly_and_all_can_be_built(kind):
+    bodies = segments(kind, RANGES[kind], 64, 3)
+    for name, attribute in (("angle_deg", "angle"), ("width_mm", "width"), ("gap_mm", "gap")):
+        low, high = RANGES[kind][name]
+        values = np.array([getattr(s, attribute) for s in bodies])
+        # a scrambled Sobol sequence of 64 puts one point into each 64th
+        assert sorted(((values - low) / (high - low) * 64).astype(int).clip(0, 63)) == pytest.approx(np.arange(64), abs=1)
+    assert all(s.side_wall == s.top_wall for s in bodies)
+
+
+def test_shape_numbers_do_not_change_with_size():
+    a, b = (
+        segments(TWISTING, {k: tuple(f * v for v in r) if k.endswith("mm") else r for k, r in RANGES[TWISTING].items()}, 1, 1)[0]
+        for f in (1, 2)
+    )
+    assert b.width == pytest.approx(2 * a.width, abs=1e-3)
+    assert shape_numbers(b) == pytest.approx(shape_numbers(a), rel=1e-3)
+    assert shape_numbers(a)[[SHAPE.index("cavity_thickness"), SHAPE.index("gap")]].sum() + 2 * shape_numbers(a)[
+        SHAPE.index("wall")
+    ] == pytest.approx(1)
+
+
+def test_prescribed_strains_take_the_energy_they_are_told():
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(6, 6))
+    K, q = root @ root.T + np.eye(6), np.array([1.1, 0.02, 0, 0.03, 0.2, 0])
+    free = q[3:] @ K[3:, 3:] @ q[3:]
+    for p in prescribed_states(ONE_SIDED, 3, 3, 5)[2][1:]:
+        change = prescribed_change(q, K, p.amplitude, p.direction)
+        assert change @ K @ change == pytest.approx(p.amplitude**2 * free, rel=1e-5)
+        assert 0.4 <= p.amplitude <= 1.5
+    twofold = prescribed_states(ONE_SIDED, 1, 1, 5)[0][0]
+    assert q + prescribed_change(q, K, twofold.amplitude, twofold.direction) == pytest.approx([1.2, 0.04, 0, 0.06, 0.4, 0])
+
+
+def test_first_touch_is_where_the_wall_distance_passes_zero():
+    states = [{"kind": "free", "pressure": p, "wall_distance": d} for p, d in ((0.0, 1.0), (0.1, 0.25), (0.2, -0.25), (0.3, -0.5))]
+    assert first_touch(states) == pytest.approx(0.15)
+    assert first_touch(states[:2]) is None and first_touch([{**s, "wall_distance": None} for s in states]) is None
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("design = 3", "designs"),
+        ("designs = 0", "designs = 0 must lie in"),
+        ('kinds = ["both"]', "'one-sided', 'twisting'"),
+        ('[[mesh]]\nname = "a"', "mesh_size_mm' is missing"),
+        ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
+        ("[ranges.one-sided]\nangle_deg = [10, 20]", "outside 30..150"),
+    ],
+)
+def test_a_slip_in_the_file_is_named(tmp_path, text, message):
+    with pytest.raises(InputError, match=message):
+        campaign(tmp_path, text)

@@ -1,0 +1,51 @@
+"""`pneunet campaign` with real finite elements, as a user starts it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from base.dataset import read_dataset
+
+ROOT = Path(__file__).resolve().parents[2]
+CAMPAIGN = """kinds = ["one-sided"]
+designs = {designs}
+held_out_every = 2
+levels = 2
+top_pressure_over_mu = 0.1
+[[mesh]]
+name = "coarse"
+mesh_size_mm = 6
+prescribed = 2
+"""
+
+
+def campaign(ranks, folder, designs):
+    (folder / "campaign.toml").write_text(CAMPAIGN.format(designs=designs))
+    command = [sys.executable, "-m", "pneunet", "campaign", str(folder / "campaign.toml"), "-o", str(folder / "out")]
+    line = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), "--", *command]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=300, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    return done.stdout, read_dataset(folder / "out" / "cells.npz")
+
+
+def test_a_campaign_grows_and_its_states_are_those_of_one_potential(tmp_path):
+    _, first = campaign(2, tmp_path, 1)
+    text, data = campaign(1, tmp_path, 2)
+    assert "1 of 2 cases are finished" in text
+    assert data.accepted.all() and data.held_out.tolist() == [False, True]
+    assert (data.strains[data.case == 0] == first.strains).all()
+    assert (tmp_path / "out" / "cells.md").read_text().startswith("# Data set of unit cells")
+    for row in (0, 1):
+        free = np.flatnonzero((data.case == row) & ~data.prescribed)
+        held = np.flatnonzero((data.case == row) & data.prescribed)
+        assert data.pressure[free] == pytest.approx([0, 0.05, 0.1]) and len(held) == 2
+        assert np.abs(data.forces[free]).max() < 1e-6 < 1e-3 < np.linalg.norm(data.forces[held], axis=1).min()
+        # forces are the potential's slope: from the free state they are the mean of the two stiffnesses, to second order
+        for i in held:
+            start = free[np.argmin(np.abs(data.pressure[free] - data.pressure[i]))]
+            change = data.strains[i] - data.strains[start]
+            mean = (data.matrices[i] + data.matrices[start]) / 2
+            assert data.forces[i] == pytest.approx(mean @ change, abs=0.05 * np.linalg.norm(data.forces[i]))

@@ -1,0 +1,195 @@
+"""The trained law on made-up cells: a smooth law that obeys the symmetries, in the schema of the data set."""
+
+import numpy as np
+import pytest
+
+from base.dataset import UPPER, CellData, columns, write_dataset
+from base.errors import InputError
+from base.materials import NeoHookean, Yeoh
+from geometry import Segment
+from geometry.parameters import KINDS, ONE_SIDED, TWISTING
+from geometry.shape_numbers import SHAPE, segment_of, shape_numbers
+from reduced.law import RodLaw, read_law
+from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
+from reduced.potential import monomials, whitening
+from reduced.training import run_training
+
+DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
+
+
+def true_free(kind, shape, P):
+    """(6,) free strains."""
+    c, width, wall = np.cos(np.radians(shape[0])), shape[SHAPE.index("width")], shape[SHAPE.index("wall")]
+    size = P * np.exp(0.4 * np.log(width) - np.log(wall) + 0.8 * c**2 + 0.5 * P)
+    if kind == ONE_SIDED:
+        return REST + size * np.array([0.2 + 0.1 * c**2, -0.2 * c, 0, c * (1 + P), 1, 0])
+    return REST + size * np.array([1, 0, 0, 2 * c / width, 0, 0])
+
+
+def true_stiffness(kind, shape, P):
+    """(6, 6) of the free state."""
+    c, K = np.cos(np.radians(shape[0])), np.zeros((6, 6))
+    for block in BLOCKS[kind]:
+        L = np.eye(len(block))
+        for i in range(len(block)):
+            for j in range(i):
+                odd = MIRROR[block[i]] * MIRROR[block[j]] < 0
+                L[i, j] = (0.3 * c if odd else 0.2) * (1 + P) / (1 + i)
+        D = np.exp(0.5 * np.log(shape[SHAPE.index("wall")]) + P) / (1.0 + np.array(block))
+        K[np.ix_(block, block)] = L @ np.diag(D) @ L.T
+    return K
+
+
+def made_up_data():
+    rng = np.random.default_rng(4)
+    rows = {f.name: [] for f in columns()}
+    for number, kind in enumerate(KINDS):
+        for design in range(DESIGNS):
+            v = rng.uniform([45, 1.5, 0.6, 0.25, 0.15, 0.12, 0.3, 0.3, 0.25], [90, 2.5, 1.2, 0.4, 0.25, 0.25, 0.6, 0.6, 0.35])
+            shape = dict(zip(("angle", "width", "chamber_height", "cavity_thickness", "wall", "top_wall"), v))
+            shape |= {"base_thickness": v[6], "channel_width": v[7], "channel_height": v[8]}
+            shape["gap"] = 1 - shape["cavity_thickness"] - 2 * shape["wall"]
+            shape["side_wall"] = shape["roof"] = shape["top_wall"]
+            shape["cavity_floor"] = shape["channel_height"] / 2 * (1 if kind == ONE_SIDED else rng.uniform(0.3, 1))
+            s = np.array([shape[name] for name in SHAPE])
+            case = {"kind": number, "design": design, "held_out": design % 5 == 4, "shape": s, "limit_pressure": np.nan}
+            for f in columns():
+                if f.metadata["of"] == "cases":
+                    rows[f.name].append(case.get(f.name, 0))
+            row = len(rows["kind"]) - 1
+            for P in PRESSURES:
+                add_state(rows, row, P, true_free(kind, s, P), np.zeros(6), true_stiffness(kind, s, P), False)
+            for P in PRESSURES[[2, 4]]:
+                K, free = true_stiffness(kind, s, P), true_free(kind, s, P)
+                change = rng.normal(size=6) * 0.1
+                M, D1 = whitening(kind, K[None])
+                v = M[0] @ change
+                force = D1[0] * M[0].T @ (v + 4 * 0.7 * (v @ v) * v)  # 0.7 |v|^4: a sum of allowed monomials
+                add_state(rows, row, P, free + change, force, K, True)
+    about = {"kinds": list(KINDS), "meshes": [{"name": "a", "mesh_size_mm": 1}], "shape": list(SHAPE), "statuses": ["done"]}
+    about |= {"largest_symmetry_defect": 0.01, "revisions": ["made up"], "reasons": {}}
+    return CellData(about, **{f.name: np.array(rows[f.name], f.metadata["type"]) for f in columns()})
+
+
+def add_state(rows, row, P, strains, forces, K, prescribed):
+    state = {"case": row, "prescribed": prescribed, "pressure": P, "strains": strains, "forces": forces, "stiffness": K[UPPER]}
+    for f in columns():
+        if f.metadata["of"] == "states":
+            rows[f.name].append(state.get(f.name, 0))
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("law")
+    write_dataset(folder / "cells.npz", made_up_data())
+    law = run_training(folder / "cells.npz", folder / "law.npz", say=lambda text: None, compare=False)
+    return law, folder
+
+
+def design(kind, angle=63.0, material=None, pitch=4.0):
+    shape = np.array([angle, 2.0, 0.9, 0.33, 0.2, 0.27, 0.18, 0.18, 0.45, 0.18, 0.45, 0.3, 0.15])
+    return segment_of(kind, shape, pitch, material or NeoHookean(mu=0.25))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_design_it_has_not_seen(trained, kind):
+    law, segment = trained[0].of(design(kind)), design(kind)
+    P = 0.05  # MPa
+    scale = np.array([1, 1, 1, 4, 4, 4])
+    expected = true_free(kind, shape_numbers(segment), P / 0.25) / scale
+    assert law.free_strains(P) == pytest.approx(expected, abs=3e-3 * np.linalg.norm(expected - REST))
+    K = true_stiffness(kind, shape_numbers(segment), P / 0.25) * np.outer(scale, scale) * 0.25 * 4.0**2
+    assert law.stiffness(law.free_strains(P), P) == pytest.approx(K, rel=0.02, abs=0.02 * abs(K).max())
+    assert law.doubts(P) == ()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_force_and_stiffness_are_slopes_of_psi_and_vanish_at_the_free_state(trained, kind):
+    law, P, h = trained[0].of(design(kind)), np.array([0.03, 0.06]), 1e-5
+    free = law.free_strains(P)
+    assert law.force(free, P) == pytest.approx(np.zeros((2, 6)), abs=1e-9)
+    q = free + np.array([0.02, -0.01, 0.015, 0.004, -0.01, 0.006])
+    for i in range(6):
+        step = h * np.eye(6)[i]
+        assert (law.psi(q + step, P) - law.psi(q - step, P)) / (2 * h) == pytest.approx(law.force(q, P)[:, i], rel=1e-5, abs=1e-7)
+        slope = (law.force(q + step, P) - law.force(q - step, P)) / (2 * h)
+        assert slope == pytest.approx(law.stiffness(q, P)[:, i], rel=1e-5, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_mirror_images_and_sizes(trained, kind):
+    law = trained[0]
+    one, other = law.of(design(kind)), law.of(design(kind).mirrored)
+    q = one.free_strains(0.05) + [0.02, 0.01, 0.01, 0.003, 0.002, 0.001]
+    assert other.free_strains(0.05) == pytest.approx(one.free_strains(0.05) * MIRROR, abs=1e-12)
+    assert other.force(q * MIRROR, 0.05) == pytest.approx(one.force(q, 0.05) * MIRROR, abs=1e-9)
+    large = law.of(design(kind, pitch=8.0))
+    assert large.free_strains(0.05)[3:] == pytest.approx(one.free_strains(0.05)[3:] / 2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_slopes_of_the_free_strains(trained, kind):
+    law, shape, P = trained[0].kinds[kind], np.array([shape_numbers(design(kind))]), np.array([0.2])
+    q, slopes = law.free_strains_and_slopes(shape, P)
+    assert q == pytest.approx(law.free_strains(shape, P))
+    for i in range(14):
+        h = 1e-5 * (shape[0, i] if i < 13 else P[0])
+        ends = []
+        for sign in (1, -1):
+            s, p = shape.copy(), P.copy()
+            if i < 13:
+                s[0, i] += sign * h
+            else:
+                p[0] += sign * h
+            ends.append(law.free_strains(s, p)[0])
+        assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(slopes[0, :, i], rel=1e-4, abs=1e-7)
+
+
+def test_held_out_figures_of_an_easy_law_are_small_and_its_intervals_honest(trained):
+    for figures in trained[0].about["figures"].values():
+        assert figures["law_strain_median_rel"] < 2e-3 and figures["law_strain_p95_rel"] < 0.02
+        assert figures["law_stiffness_p95_rel"] < 0.02 and figures["law_force_p95_rel"] < 0.05
+        assert figures["law_interval_coverage_90"] > 0.7
+
+
+def test_it_says_when_it_is_asked_outside(trained):
+    law = trained[0]
+    assert law.of(design(ONE_SIDED)).doubts(0.25 * 0.5)  # P/mu = 0.5
+    assert law.of(Segment(ONE_SIDED, 60.0, 1, width=40.0, material=NeoHookean(mu=0.25))).doubts(0.01)
+    other = design(ONE_SIDED, material=Yeoh(c10=0.125, c20=0.01))
+    assert any("neo-Hookean" in text for text in law.of(other).doubts(0.05))
+    with pytest.raises(InputError, match="one-sided segments only"):
+        RodLaw({ONE_SIDED: law.kinds[ONE_SIDED]}, {}).of(design(TWISTING))
+
+
+def test_a_file_gives_the_same_law(trained):
+    law, folder = trained
+    again = read_law(folder / "law.npz")
+    for kind in KINDS:
+        segment = design(kind)
+        q = law.of(segment).free_strains(0.05) + 0.01
+        assert (again.of(segment).force(q, 0.05) == law.of(segment).force(q, 0.05)).all()
+        assert again.of(segment).half_width(0.05) == pytest.approx(law.of(segment).half_width(0.05), rel=0.05, abs=1e-5)
+    with pytest.raises(InputError, match="not a trained law"):
+        (folder / "bad.npz").write_text("")
+        read_law(folder / "bad.npz")
+    assert "law_strain_p95_rel" in (folder / "law.md").read_text()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_learned_numbers_give_strains_and_stiffness_back(kind):
+    rng, co = np.random.default_rng(2), Coordinates(kind)
+    shape = np.array([shape_numbers(design(kind, angle)) for angle in (50.0, 80.0)])
+    P = np.array([0.1, 0.2])
+    q = np.array([true_free(kind, s, p) for s, p in zip(shape, P)])
+    assert co.strains(shape, P, co.learned_strains(shape, P, q)) == pytest.approx(q)
+    K = np.array([true_stiffness(kind, s, p) for s, p in zip(shape, P)])
+    assert co.stiffness(shape, co.learned_stiffness(shape, K)) == pytest.approx(K)
+    anything = co.stiffness(shape, rng.normal(size=(2, len(co.stiffness_parity))))
+    assert (np.linalg.eigvalsh(anything) > 0).all()
+
+
+def test_monomials_are_those_that_half_turns_leave():
+    # cubic and quartic, even in (e3, k3); for the twisting kind also in (e2, k2)
+    assert len(monomials(ONE_SIDED)) == 20 + 4 * 3 + 35 + 10 * 3 + 5
+    assert len(monomials(TWISTING)) == 4 + 2 * 3 * 2 + 5 + 3 * 3 * 2 + 5 * 2 + 3 * 3
