@@ -13,6 +13,7 @@ from pathlib import Path
 from base.files import write_text
 from base.record import machine, revision
 from benchmarks import cell, chain, contact, rod, segments, speed, verification
+from benchmarks.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"
@@ -138,8 +139,8 @@ def snapshot():
         merge(ROOT / "docs" / name, json.loads((OUT / name).read_text()))
     results, meta = (json.loads((ROOT / "docs" / name).read_text()) for name in ("results.json", "results.meta.json"))
     lines = ["# Figures", "", "Made by `make bench` and `python -m benchmarks --snapshot`; do not edit.", ""]
-    lines += ["| key | value | what it is |", "|---|---|---|"]
-    lines += [f"| `{key}` | {value:.4g} | {MEANING[key]} |" for key, value in sorted(results.items())]
+    rows = [(f"`{key}`", f"{results[key]:.4g}", meaning.replace("|", "\\|")) for key, meaning in MEANING.items() if key in results]
+    lines += table(["key", "value", "what it is"], rows)
     lines += ["", "| part | date | revision | machine | calibration loop, s |", "|---|---|---|---|---|"]
     for part, m in sorted(meta.items()):
         where = f"{m['machine']['processor']}, {m['machine']['cores']} cores"
