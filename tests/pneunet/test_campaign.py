@@ -48,4 +48,4 @@ def test_a_campaign_grows_and_its_states_are_those_of_one_potential(tmp_path):
             start = free[np.argmin(np.abs(data.pressure[free] - data.pressure[i]))]
             change = data.strains[i] - data.strains[start]
             mean = (data.matrices[i] + data.matrices[start]) / 2
-            assert data.forces[i] == pytest.approx(mean @ change, abs=0.05 * np.linalg.norm(data.forces[i]))
+            assert data.forces[i] == pytest.approx(mean @ change, abs=0.05 * float(np.linalg.norm(data.forces[i])))
