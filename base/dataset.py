@@ -8,13 +8,12 @@ neo-Hookean material, and everything per undeformed length of the segment:
 One row a *case* (a design on a mesh) and one row a *state* (an equilibrium of a case).
 """
 
-import json
 from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from base.archive import read_archive, write_archive
 from base.errors import InputError
-from base.files import atomic_path
 
 SCHEMA = "pneunet-cells-1"
 #: row-wise upper triangle of a symmetric 6 x 6 matrix
@@ -133,21 +132,10 @@ def columns():
 def write_dataset(path, data):
     """Write CellData to `path` (.npz)."""
     arrays = {f.name: np.asarray(getattr(data, f.name)).astype(f.metadata["type"]) for f in columns()}
-    about = np.frombuffer(json.dumps({"schema": SCHEMA, **data.about}).encode(), np.uint8)
-    with atomic_path(path) as temporary:
-        with open(temporary, "wb") as stream:
-            np.savez_compressed(stream, about=about, **arrays)
+    write_archive(path, SCHEMA, data.about, arrays, compress=True)
 
 
 def read_dataset(path):
     """The CellData in a file; InputError when it is none or of another version."""
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            about = json.loads(bytes(stored["about"]))
-            if about.get("schema") != SCHEMA:
-                raise InputError(f"{path}: schema '{about.get('schema')}' is not '{SCHEMA}': make it again with pneunet campaign")
-            return CellData(about, **{f.name: stored[f.name] for f in columns()})
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file: make it with pneunet campaign") from None
-    except (KeyError, ValueError, OSError) as error:
-        raise InputError(f"{path}: not a data set of cells ({error}): make it again with pneunet campaign") from None
+    with read_archive(path, SCHEMA, "a data set of cells", "pneunet campaign") as (about, stored):
+        return CellData(about, **{f.name: stored[f.name] for f in columns()})

@@ -5,14 +5,13 @@ free_strains(P), psi(q, P), force(q, P), stiffness(q, P). Everything else is wit
 `pneunet train` (reduced.training); numpy and scipy alone.
 """
 
-import json
 from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
 
+from base.archive import read_archive, write_archive
 from base.errors import InputError
-from base.files import atomic_path
 from base.materials import NeoHookean
 from base.strains import RodStrains
 from geometry.parameters import TWISTING
@@ -209,24 +208,14 @@ def write_law(path, law):
                 arrays[f"{kind}/{name}/{f.name}"] = value
         arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
         arrays |= {f"{kind}/coefficients": k.anharmonic.coefficients, f"{kind}/reach": np.asarray(k.anharmonic.reach)}
-    about = {"schema": SCHEMA, "kinds": list(law.kinds), "shape": list(SHAPE), "lengths": LENGTHS, **law.about}
-    with atomic_path(path) as temporary:
-        with open(temporary, "wb") as stream:
-            np.savez(stream, about=np.frombuffer(json.dumps(about).encode(), np.uint8), **arrays)
+    about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": LENGTHS, **law.about}
+    write_archive(path, SCHEMA, about, arrays)
 
 
 def read_law(path):
     """The RodLaw in a file; InputError when it is none or of another version."""
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            about = json.loads(bytes(stored["about"]))
-            if about.get("schema") != SCHEMA:
-                raise InputError(f"{path}: schema '{about.get('schema')}' is not '{SCHEMA}': make it again with pneunet train")
-            return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file: make it with pneunet train") from None
-    except (KeyError, ValueError, OSError) as error:
-        raise InputError(f"{path}: not a trained law ({error}): make it again with pneunet train") from None
+    with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, stored):
+        return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about)
 
 
 def _triangle(flat):
