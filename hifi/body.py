@@ -9,6 +9,8 @@ from hifi.solver import DirectSolver
 class BodySystem:
     """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each linear in it."""
 
+    stale, overreach = False, 0.0  # no contact
+
     def __init__(self, problem, coordinates, apply_load):
         self.problem, self.coordinates, self.apply_load = problem, coordinates, apply_load
         self.comm = problem.mesh.comm

@@ -2,7 +2,7 @@
 
 The range is found first: by the cavity's volume the path is walked until the pressure asked for or a limit point of it. The
 states at the levels are then corrected from interpolations of that path, at fractions of the top pressure; beyond a share of the
-limit load nothing is recorded. Everything is in mm and MPa with mu = 1 MPa.
+limit load nothing is recorded. Walls that touch are held apart. Everything is in mm and MPa with mu = 1 MPa.
 """
 
 import json
@@ -24,6 +24,7 @@ from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath, PathState
 from hifi.solver import NotConverged
 from hifi.stepping import StepSize, run_steps
+from hifi.wall_contact import WallPenalty
 
 STATES = "states.json"
 #: the path is only a guide for what is computed on it
@@ -49,7 +50,7 @@ def solve_campaign_case(inputs, directory):
     segment = segment_from_table(inputs["segment"], "segment", material_from_table(inputs["material"], "material"))
     path = directory / "cell.msh"
     mesh = mesh_cell(segment, path=path, **{key.removesuffix("_mm"): value for key, value in inputs["mesh"].items()})
-    sampler = Sampler(CellProblem(segment, path), directory)
+    sampler = Sampler(CellProblem(segment, path, contact=WallPenalty()), directory)
     path.unlink()
     mesh["unknowns"] = sampler.problem.unknowns
     top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
@@ -155,8 +156,9 @@ class Sampler:
             "unstable": state.unstable,
             "largest_stretch": state.largest_stretch,
             "residual": residual / scale,
-            "wall_distance": getattr(state, "wall_distance", None),
-            "contact": getattr(state, "contact", None) is not None,
+            "wall_distance": state.wall_distance,
+            "contact": state.contact is not None,
+            "contact_force": state.contact.force,
         }
         self.states.append(row)
         write_text(self.directory / STATES, json.dumps(self.states, default=float))
@@ -186,11 +188,16 @@ class Sampler:
 
 
 def first_touch(states):
-    """Pressure (MPa) at which the free states' wall distance passes zero; None where it does not or is not known."""
-    known = [(s["pressure"], s["wall_distance"]) for s in states if s["kind"] == "free" and s["wall_distance"] is not None]
-    for (p, a), (q, b) in zip(known, known[1:]):
-        if a > 0 >= b:
-            return p + (q - p) * a / (a - b)
+    """Pressure (MPa) between the last free state whose walls do not push at each other and the next, where the distance that the two
+    before it lose goes to zero; None where no walls push."""
+    free = [s for s in states if s["kind"] == "free"]
+    for before, last, pushing in zip([None, *free], free, free[1:]):
+        if pushing["contact_force"] > 0:
+            if before is None:
+                return last["pressure"]
+            rate = (before["wall_distance"] - last["wall_distance"]) / (last["pressure"] - before["pressure"])
+            gone = last["wall_distance"] / rate if rate > 0 else np.inf
+            return float(min(last["pressure"] + gone, pushing["pressure"]))
     return None
 
 

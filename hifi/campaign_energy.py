@@ -18,7 +18,8 @@ class StoredEnergy:
         dx = ufl.Measure("dx", domain=mesh, subdomain_data=problem.cell_tags, metadata={"quadrature_degree": DEGREE})
         _, p = ufl.split(problem.state)
         air = AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * ufl.det(F))
+        self._contact = problem.contact
         self._form = compat.compile_form(energy_density(mesh, material, F, p) * dx(cad.BODY) + air * dx(AIR))
 
     def value(self):
-        return float(fem.assemble_scalar(self._form))
+        return float(fem.assemble_scalar(self._form)) + (self._contact.energy() if self._contact else 0.0)

@@ -21,8 +21,10 @@ from scipy.spatial import cKDTree
 from geometry import cad
 from geometry.cell import AIR, GAP
 from hifi import compat, surface
+from hifi.cell_contact import CellContact
 from hifi.materials import energy_density
 from hifi.stretch import PrincipalStretch
+from hifi.walls import CellWalls
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
 DEGREE = 4
@@ -37,10 +39,11 @@ class CellProblem:
     Any pitch of the periodic body will do, whatever its cut's place or shape, and any object with a pitch, a width, a material
     and a layer_material serves as segment. gauge: tags of the facets whose rigid fit is the section frame; centre: X1 (mm)
     where that frame sits, in the middle of the pitch over which it is fitted. rollers: {facet tag: component of u that is zero}.
-    medium: a hifi.contact.ThirdMedium that fills the gaps, which must be meshed then; without it, meshed gaps are void.
+    contact: the hifi.wall_contact.WallPenalty between the walls of the gaps. medium: or a hifi.contact.ThirdMedium that fills the
+    gaps, which must be meshed then; without it, meshed gaps are void.
     """
 
-    def __init__(self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None, medium=None):
+    def __init__(self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None, medium=None, contact=None):
         self.segment, comm = segment, MPI.COMM_SELF
         self.mesh, self.cell_tags, self.facet_tags = mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, comm)
         mesh = self.mesh
@@ -58,6 +61,8 @@ class CellProblem:
         self._define_forms()
         self._reduce(rollers or {})
         self._define_gauge(gauge, centre)
+        self.walls = CellWalls(self)
+        self.contact = CellContact(self, self.walls, contact) if contact else None
         self.stretch = PrincipalStretch(self, self.cell_tags.indices[np.isin(self.cell_tags.values, (cad.BODY, cad.LAYER))])
 
     def _define_forms(self):
@@ -173,7 +178,11 @@ class CellProblem:
 
     def residual(self):
         """(dPi/du,p (unknowns,), dPi/d(e,k) (6,)) at the current state, strains and pressure."""
-        return self._vector_of(self._residual), self._sums_of(self._slope)
+        forces, slope = self._vector_of(self._residual), self._sums_of(self._slope)
+        if self.contact:
+            pushing, screwing = self.contact.residual()
+            forces, slope = forces + pushing, slope + screwing
+        return forces, slope
 
     def _sums_of(self, form):
         """(6,) integrals of a form with one component for each of (e, k)."""
@@ -187,12 +196,13 @@ class CellProblem:
         _, _, data = self._matrix.getValuesCSR()
         if self._bordered is None:
             self._bordered = _BorderedPattern(self._matrix, self.reduced, self.gauge)
-        matrix, n = self._bordered.filled(data), self.unknowns
+        touching, pushed, screwed = self.contact.tangent() if self.contact else ((), 0.0, 0.0)
+        matrix, n = self._bordered.filled(data, *touching), self.unknowns
         mixed, curvature = np.empty((n, 6)), np.empty((6, 6))
         for i in range(6):
             self._direction.value[:] = np.eye(6)[i]
             mixed[:, i], curvature[:, i] = self._vector_of(self._mixed), self._sums_of(self._curvature)
-        return matrix, mixed, curvature
+        return matrix, mixed + pushed, curvature + screwed
 
     def contact_forces(self):
         """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their X1."""
@@ -201,30 +211,57 @@ class CellProblem:
         fem.petsc.assemble_vector(self._vector, self._contact)
         return -self._vector.array[self.displacement_dofs]
 
+    def measure_contact(self):
+        """hifi.walls.WallContact of the gap with the largest force; None without contact."""
+        pressure = float(self.pressure.value)
+        if self.contact:
+            return self.contact.measure(pressure)
+        return self.walls.contact(pressure) if self.medium else None
+
     def air_volume(self):
         """Volume (mm3) of the air in one pitch."""
         return float(fem.assemble_scalar(self._volume))
 
 
 class _BorderedPattern:
-    """Where the entries of a matrix of the mixed space go in that of the unknowns, bordered by the gauge."""
+    """Where the entries of a matrix of the mixed space go in that of the unknowns, bordered by the gauge.
+
+    It grows by the entries of walls that touch, and keeps them when they part: a new pattern costs a new analysis.
+    """
 
     def __init__(self, matrix, reduced, gauge):
         indptr, indices, _ = matrix.getValuesCSR()
         rows, columns = reduced[np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))], reduced[indices]
         self._keep = np.flatnonzero((rows >= 0) & (columns >= 0))
-        border, size = gauge.tocoo(), sum(gauge.shape)
-        i, j, corner = border.row.astype(np.int64), border.col + gauge.shape[0], np.arange(gauge.shape[0], size)
+        border, self._size = gauge.tocoo(), sum(gauge.shape)
+        i, j, corner = border.row.astype(np.int64), border.col + gauge.shape[0], np.arange(gauge.shape[0], self._size)
         self._border = np.concatenate([border.data, border.data, np.zeros(len(corner))])
-        key = np.concatenate([rows[self._keep], i, j, corner]) * size + np.concatenate([columns[self._keep], j, i, corner])
-        key, self._place = np.unique(key, return_inverse=True)
-        self._indices, self._indptr = key % size, np.searchsorted(key, size * np.arange(size + 1))
-        self._shape = size, size
+        rows = np.concatenate([rows[self._keep], i, j, corner])
+        self._known = self._key(rows, np.concatenate([columns[self._keep], j, i, corner]))
+        self._arrange(self._known)
 
-    def filled(self, data):
-        """CSR matrix of the values `data` of the mixed space's matrix."""
-        values = np.bincount(self._place, np.concatenate([data[self._keep], self._border]), len(self._indices))
-        return sp.csr_matrix((values, self._indices, self._indptr), shape=self._shape)
+    def _key(self, rows, columns):
+        return rows * np.int64(self._size) + columns
+
+    def _arrange(self, key):
+        self._keys = np.unique(key)
+        self._place = np.searchsorted(self._keys, self._known)
+        self._indices = (self._keys % self._size).astype(np.int32)
+        self._indptr = np.searchsorted(self._keys, self._size * np.arange(self._size + 1)).astype(np.int32)
+
+    def filled(self, data, rows=(), columns=(), values=()):
+        """CSR matrix of the values `data` of the mixed space's matrix and of entries (row, column, value) of the unknowns.
+
+        Its `indices` are the same array until the pattern grows.
+        """
+        key = self._key(np.asarray(rows, np.int64), np.asarray(columns, np.int64))
+        place = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
+        if (self._keys[place] != key).any():
+            self._arrange(np.concatenate([self._keys, key]))
+            place = np.searchsorted(self._keys, key)
+        entries = np.concatenate([data[self._keep], self._border, values])
+        summed = np.bincount(np.concatenate([self._place, place]), entries, len(self._keys))
+        return sp.csr_matrix((summed, self._indices, self._indptr), shape=(self._size, self._size))
 
 
 def _same_modulo(points, pitch, tolerance=1e-5):

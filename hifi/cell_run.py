@@ -26,10 +26,6 @@ from hifi.stepping import StepSize, lagrange_coefficients, run_steps
 CONTACT_PATIENCE = 10.0
 
 
-class _Touch(Exception):
-    """Walls overlap where contact was to be switched on."""
-
-
 def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lambda point: None, on_touch=lambda pressure: None):
     """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns (last CellState, mesh facts).
 
@@ -38,33 +34,21 @@ def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lamb
     has been seen by `on_state`.
     """
     edge_size = case.mesh_size * EDGE if case.graded else None
-    facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=case.contact != "none", edge_size=edge_size)
-    seen = []
-
-    def see(state):
-        seen.append(state)
-        on_state(state)
-
-    if case.contact != "third-medium":
-        try:
-            return _follow(case, CellProblem(case.segment, mesh_path), see, on_limit_point, on_touch), facts
-        except _Touch:
-            pass
-    problem = CellProblem(case.segment, mesh_path, medium=case.medium)
-    return _follow(case, problem, see, on_limit_point, on_touch, len(seen)), facts
+    medium = case.medium if case.contact == "third-medium" else None
+    facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=medium is not None, edge_size=edge_size)
+    problem = CellProblem(case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None)
+    return _follow(case, problem, on_state, on_limit_point, on_touch), facts
 
 
-def _follow(case, problem, on_state, on_limit_point, on_touch, known=0):
-    """Last CellState of the path, of which `on_state` has seen the first `known` states. _Touch when walls meet and `case`
-    wants contact from there on."""
+def _follow(case, problem, on_state, on_limit_point, on_touch):
+    """Last CellState of the path."""
     medium, mu = problem.medium, case.segment.material.mu
     options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
     if medium:
         options.patience = CONTACT_PATIENCE
     system = CellSystem(problem)
-    switch = case.contact == "auto" and case.control == "pressure"
     distances = [(0.0, system.walls.distance())]
-    count, last, passed = 0, [], 0
+    last, passed = [], 0
     effort, started = {"steps": 0, "factorisations": 0, "seconds": 0.0}, time.perf_counter()
 
     def spend(step):
@@ -72,17 +56,21 @@ def _follow(case, problem, on_state, on_limit_point, on_touch, known=0):
         effort["factorisations"] += step.factorisations
         effort["seconds"] = time.perf_counter() - started
 
+    def look():
+        """Tell of the first touch. A medium pushes long before it."""
+        if distances[-1][1] > 0 and not medium:
+            distances.append((problem.pressure.value.item(), system.walls.distance() if not system.overreach else 0.0))
+            if distances[-1][1] <= 0:
+                on_touch(_first_touch(distances))
+
     def record():
-        nonlocal count
-        count += 1
-        if count > known:
-            kept = system.state.copy()
-            if medium:
-                soften(system, medium, options)
-            last[:] = [replace(system.measure(), **effort)]
-            if medium:
-                medium.softening, system.state = 0.0, kept
-            on_state(last[0])
+        kept = system.state.copy()
+        if medium:
+            soften(system, medium, options)
+        last[:] = [replace(system.measure(), **effort)]
+        if medium:
+            medium.softening, system.state = 0.0, kept
+        on_state(last[0])
 
     try:
         record()
@@ -102,12 +90,7 @@ def _follow(case, problem, on_state, on_limit_point, on_touch, known=0):
             for point in path.limit_points[passed:]:
                 on_limit_point(point)
             passed = len(path.limit_points)
-            if not medium and distances[-1][1] > 0:
-                distances.append((problem.pressure.value.item(), system.walls.distance()))
-                if distances[-1][1] <= 0:
-                    on_touch(_first_touch(distances))
-                    if switch:
-                        raise _Touch
+            look()
             if step.load in marks:
                 record()
                 path.newton.current &= not medium
@@ -115,10 +98,7 @@ def _follow(case, problem, on_state, on_limit_point, on_touch, known=0):
         run_steps(path, target, StepSize(first, 1e-4 * first, milestones=marks), keep)
         if case.held:
             system = _hold(problem, system, case, options, spend)
-            if not medium and distances[-1][1] > 0 and system.walls.distance() <= 0:
-                on_touch(case.pressure)
-                if switch:
-                    raise _Touch
+            look()
             record()
         return last[0]
     finally:
@@ -126,7 +106,10 @@ def _follow(case, problem, on_state, on_limit_point, on_touch, known=0):
 
 
 def _first_touch(distances):
-    """Pressure at which the wall distance passes zero, from (pressure, distance) of which the last is the first below zero."""
+    """Pressure at which the wall distance passes zero, from (pressure, distance) of which the last is the first that is not above.
+
+    With contact the first state in touch is known to be close to it: the path takes no step across a deep overlap.
+    """
     pressures, gaps = np.array(distances[-3:]).T
     return float(sum(p * w for p, w in zip(pressures, lagrange_coefficients(gaps, 0.0))))
 
@@ -196,8 +179,7 @@ def run_cell(path, directory, say=print):
 
     def touch(pressure):
         touched.append(pressure * KPA)
-        alone = case.contact == "none" or case.control == "volume"
-        then = "beyond it states are marked 'walls overlap'" if alone else "going on with contact"
+        then = "beyond it states are marked 'walls overlap'" if case.contact == "none" else "contact holds them apart"
         say(f"walls touch at {touched[0]:.2f} kPa; {then}")
 
     status, facts, touched = "reached what was asked for", {}, []

@@ -8,7 +8,6 @@ from petsc4py import PETSc
 
 from base.strains import RodStrains
 from hifi.solver import DirectSolver
-from hifi.walls import CellWalls
 
 #: of mu pitch^2, the size of the forces in a cell
 RELATIVE_TOLERANCE = 1e-9
@@ -80,8 +79,9 @@ class CellSystem:
         self._strains = [np.eye(6)[0], np.zeros(6)] if strains is None else [np.asarray(s, float) for s in strains]
         n = problem.unknowns
         self._x = np.concatenate([np.zeros(n + 6), self._strains[0]])
-        self._solver = self._matrix = None
-        self.walls = CellWalls(problem)
+        self._solver = self._matrix = self._pattern = None
+        self._factorisations = 0
+        self.walls = problem.walls
         self.load = 0.0
         self.state = self.at_supports(self._x)
 
@@ -141,14 +141,17 @@ class CellSystem:
 
     def factorise(self):
         matrix, mixed, self._curvature = self.problem.tangent()
-        if self._matrix is None:
+        if self._pattern is not matrix.indices:
+            self._release()
+            self._pattern = matrix.indices
             self._matrix = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF)
             self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self._solver = DirectSolver(self._matrix, MPI.COMM_SELF)
         else:
-            self._matrix.setValuesCSR(matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data)
+            self._matrix.setValuesCSR(matrix.indptr, matrix.indices, matrix.data)
             self._matrix.assemble()
         self._solver.factorise()
+        self._factorisations += 1
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
         self._influence = self._solver.solve_many(self._mixed)
         self._condensed = self._curvature - self._mixed.T @ self._influence
@@ -171,8 +174,16 @@ class CellSystem:
         return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))
 
     @property
+    def stale(self):
+        return bool(self.problem.contact) and self.problem.contact.stale
+
+    @property
+    def overreach(self):
+        return self.problem.contact.overreach if self.problem.contact else 0.0
+
+    @property
     def factorisations(self):
-        return self._solver.factorisations if self._solver else 0
+        return self._factorisations
 
     def moved(self, state, increment):
         moved = state.copy()
@@ -207,11 +218,14 @@ class CellSystem:
             self.unstable,
             self.problem.stretch.largest(),
             self.walls.distance(),
-            self.walls.contact(float(self.problem.pressure.value)) if self.problem.medium else None,
+            self.problem.measure_contact(),
             self.problem.state.x.array.copy(),
         )
 
-    def destroy(self):
+    def _release(self):
         if self._solver is not None:
             self._solver.destroy()
             self._matrix.destroy()
+
+    def destroy(self):
+        self._release()

@@ -9,6 +9,7 @@ from geometry.designfile import segment_from_table
 from geometry.parameters import Segment
 from hifi.contact import ThirdMedium
 from hifi.results import KPA
+from hifi.wall_contact import WallPenalty
 
 STRAINS = ("e1", "e2", "e3", "k1_per_mm", "k2_per_mm", "k3_per_mm")
 CONTROLS = ("pressure", "volume")
@@ -16,7 +17,7 @@ KEYS = (
     *("pressure_kPa", "mesh_size_mm", "levels", "control", "volume_factor", "contact", "graded"),
     *("material", "layer_material", "segment", "held"),
 )
-CONTACTS = ("auto", "none", "third-medium")
+CONTACTS = ("auto", "third-medium", "none")
 #: size at the body's edges of a graded mesh, over its mesh_size
 EDGE = 0.2
 
@@ -27,8 +28,7 @@ class CellCase:
 
     held: {index of (e, k): prescribed value, 1/mm for k}; reached from the free state at the top pressure. control:
     'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor` times the volume at rest.
-    contact: 'third-medium', 'none', or 'auto': none until walls are seen to touch, and the third medium from there on (none
-    at all with control 'volume'). graded: elements shrink to mesh_size * EDGE at the body's edges, where stresses are singular.
+    contact: 'auto': walls that touch are held apart by the `penalty`; 'third-medium': by the `medium` in the gap; 'none'. graded: elements shrink to mesh_size * EDGE at the body's edges, where stresses are singular.
     """
 
     segment: Segment
@@ -39,6 +39,7 @@ class CellCase:
     control: str = "pressure"
     volume_factor: float = 2.0
     contact: str = "auto"
+    penalty: WallPenalty = WallPenalty()
     medium: ThirdMedium = ThirdMedium()
     graded: bool = False
 

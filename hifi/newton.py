@@ -6,11 +6,15 @@ A *system* (hifi.body, hifi.cell_system) has a state (an array), a scalar `load`
     factorise(), solve((n,)) -> (n,)      the tangent at the current state; K^-1 times an array, K possibly an older one
     moved(state, increment), dot(a, b)    retraction and inner product (over all ranks)
     volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state (None: unknown)
+    stale, overreach                      of walls that touch: whether others do than when the tangent was factorised; how deep they
+                                          overlap at the last residual, over what a correction may make of it (hifi.wall_contact)
 A *control* (hifi.control) closes the equations for the load. Between factorisations, steps are corrected by the secants seen
 so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear Algebra Appl. 16, 2009): the residual
 that the past increments explain is removed before the lagged tangent sees the rest. One solve and one residual an iteration.
 On slender bodies a lagged tangent is no help once walls have bulged, however small the step. What it makes worse is taken
 back, which costs a solve, and the tangent is factorised where the correction started: steps can be many times longer.
+Where walls touch, each change of what touches asks for a new tangent (an active-set iteration), and corrections that drive walls
+far into each other, unseen by a tangent that knew of no contact there, are shortened.
 """
 
 from dataclasses import dataclass, field
@@ -19,6 +23,10 @@ from time import perf_counter
 import numpy as np
 
 from hifi.solver import NotConverged
+
+
+#: how often a correction is shortened at most
+SHORTENINGS = 4
 
 
 @dataclass
@@ -80,7 +88,7 @@ class Newton:
             tolerance = o.relative_tolerance * scale + o.absolute_tolerance
             if norm <= tolerance and control.satisfied(system, parameter):
                 return NewtonResult(iteration, history)
-            if not self.current or iterations_left(since, tolerance) > o.patience:
+            if not self.current or system.stale or iterations_left(since, tolerance) > o.patience:
                 self.factorise()
                 secants.forget()
                 since, fresh = [], True
@@ -88,7 +96,16 @@ class Newton:
             step, load_step = self.timed("solve", self._correction, r, parameter, secants)
             system.state = system.moved(state, step)
             system.load += load_step
+            before = system.overreach
             new, new_norm, new_scale = self.residual()
+            for _ in range(SHORTENINGS * fresh):
+                if system.overreach <= 1.0 and np.isfinite(new_norm):
+                    break
+                fraction = (1.0 - before) / (system.overreach - before) if np.isfinite(new_norm) else 0.3
+                fraction = min(max(fraction, 0.1), 0.7)
+                step, load_step = fraction * step, fraction * load_step
+                system.state, system.load = system.moved(state, step), load + load_step
+                new, new_norm, new_scale = self.residual()
             history.append(new_norm)
             if not fresh and not new_norm < norm:
                 # worse by a lagged tangent: take the correction back and factorise where it started

@@ -53,7 +53,7 @@ class EquilibriumPath:
         self.newton = Newton(system, control, options)
         self.parameter = start
         self.accepted = [self._present()]
-        self._tangent = None
+        self._tangent, self._touching = None, system.overreach > 0
         #: predicted residuals (relative to the load) above this failed before; a residual is 10x cheaper than a failure
         self.trusted = np.inf
         #: LimitPoints of the load passed so far; the load cannot pass one while it is the parameter itself
@@ -76,6 +76,8 @@ class EquilibriumPath:
             step = parameter - known[0].parameter
             system.load = known[0].load + step * self._tangent[1]
             return system.moved(known[0].state, step * self._tangent[0])
+        if self._touching:
+            known = known[-1:]  # extrapolated walls part or overlap; a tangent at rest keeps together what touches
         weights = lagrange_coefficients([a.parameter for a in known], parameter)
         system.load = sum(w * a.load for w, a in zip(weights, known))
         return system.extrapolated([a.state for a in known], weights)
@@ -93,6 +95,8 @@ class EquilibriumPath:
         for known in accepted:
             self._back(known)
             self.control.accepted(known.parameter, self.system)
+        self.newton.residual()
+        self._touching = self.system.overreach > 0
 
     def _back(self, kept):
         self.system.state, self.system.load = kept.state, kept.load
@@ -108,6 +112,8 @@ class EquilibriumPath:
         try:
             if not np.isfinite(norm):
                 raise PredictorTooFar("the predicted state is beyond what the material's law allows")
+            if system.overreach > 1.0 and not self._touching:
+                raise PredictorTooFar("the predicted walls overlap")
             if not norm <= self.trusted * scale:
                 raise PredictorTooFar(f"the predicted state is off by {norm / scale:.1e} of the load")
             result = newton.solve(parameter)
@@ -117,6 +123,7 @@ class EquilibriumPath:
                 newton.current = False
             self._back(self.accepted[-1])
             raise
+        self._touching = system.overreach > 0
         self.trusted *= 1.1  # so that one bad spot does not slow the rest
         self.parameter = parameter
         self.control.accepted(parameter, system)

@@ -27,14 +27,14 @@ IN_CONTACT = 0.1
 class WallContact:
     """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm) met there.
 
-    gamma: stiffness of the medium that transmits it, over the body's.
+    gamma: stiffness of the medium that transmits it, over the body's; nan without one.
     """
 
-    force: float
-    area: float
-    nearest: float
-    farthest: float
-    gamma: float
+    force: float = 0.0
+    area: float = 0.0
+    nearest: float = np.nan
+    farthest: float = np.nan
+    gamma: float = np.nan
 
 
 class WallDistances:
