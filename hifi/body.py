@@ -9,7 +9,7 @@ from hifi.solver import DirectSolver
 class BodySystem:
     """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each linear in it."""
 
-    stale, overreach = False, 0.0  # no contact
+    overreach = 0.0  # no contact
 
     def __init__(self, problem, coordinates, apply_load):
         self.problem, self.coordinates, self.apply_load = problem, coordinates, apply_load
@@ -65,6 +65,9 @@ class BodySystem:
         self.problem.assemble_tangent(self._matrix)
         self.solver.factorise()
         self._rotation_then = self._rotations()
+
+    def renew(self):
+        return False
 
     def _rotations(self):
         return self.coordinates.sections(self.coordinates.nodes + self.problem.displacement())[:, :3, :3]

@@ -5,6 +5,7 @@ lies at exp(s (k, e)) y: linear in y, and its derivatives by the strains are exa
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,9 +21,6 @@ _ORDER = [3, 4, 5, 0, 1, 2]
 
 #: of the gap: corrections are shortened to this overlap
 DEEPEST = 0.1
-#: part of the contact's stiffness that may have come or gone before a tangent is stale
-CHANGED = 0.15
-
 
 class CellContact:
     """Contact in the gaps of `walls` (hifi.walls.CellWalls) under a hifi.wall_contact.WallPenalty."""
@@ -30,7 +28,7 @@ class CellContact:
     def __init__(self, problem, walls, penalty):
         self.problem, segment = problem, problem.segment
         self.law = penalty.on(segment.material.mu, segment.gap)
-        self._sides, self._stiff_then, self._stiff_now = [], {}, {}
+        self._sides, self._then, self._now = [], [], []
         #: deepest overlap at the last residual, over DEEPEST of the gap; 0 where nothing comes closer than the penalty's onset
         self.overreach = 0.0
         for gap in walls.gaps:
@@ -62,9 +60,8 @@ class CellContact:
     def residual(self):
         """(unknowns,) and (6,): how the energy changes with the problem's unknowns and strains (e, k)."""
         forces, slope = np.zeros(self.problem.unknowns), np.zeros(6)
-        self._stiff_now, deepest = {}, 0.0
-        for side in self._touching():
-            self._stiff_now |= side.stiffnesses()
+        self._now, deepest = self._touching(), 0.0
+        for side in self._now:
             deepest = max(deepest, side.touching.overlap.max() + self.law.onset)
             local, wrench = side.first_derivatives()
             np.add.at(forces, side.columns[side.kept], local[side.kept])
@@ -76,10 +73,10 @@ class CellContact:
         """((rows, columns, values) in the unknowns, (unknowns, 6), (6, 6)): second derivatives of the energy."""
         n = self.problem.unknowns
         total, mixed, curvature = sp.csr_matrix((n, n)), np.zeros((n, 6)), np.zeros((6, 6))
-        self._stiff_then = {}
-        for side in self._touching():
-            self._stiff_then |= side.stiffnesses()
-            bend, coupling, own, gradient, by_strains = side.second_derivatives()
+        self._then = self._touching()
+        for side in self._then:
+            bend, coupling, own = side.second_derivatives()
+            gradient, by_strains = side.gap_gradients
             stiff = sp.diags(side.touching.area * side.touching.slope)
             total = total + bend + gradient.T @ stiff @ gradient
             mixed += coupling + gradient.T @ (stiff @ by_strains)
@@ -87,10 +84,21 @@ class CellContact:
         total = total.tocoo()
         return (total.row, total.col, total.data), mixed, curvature
 
-    @property
-    def stale(self):
-        """Whether other points push at the last residual than at the last tangent."""
-        return changed(self._stiff_then, self._stiff_now) > CHANGED
+    def stiffnesses(self):
+        """{point: N/mm} at the last residual."""
+        return {point: value for side in self._now for point, value in side.stiffnesses().items()}
+
+    def gradients(self, points):
+        """(m, unknowns + 6): how the gaps of points that push, or did so at the last tangent, change with unknowns and strains."""
+        out = np.zeros((len(points), self.problem.unknowns + 6))
+        places = {p: i for i, p in enumerate(points)}
+        for side in [*self._then, *self._now]:
+            rows = [(places[p], row) for row, p in enumerate(side.stiffnesses()) if p in places]
+            if rows:
+                to, of = np.array(rows).T
+                gradient, by_strains = side.gap_gradients
+                out[to] = np.hstack([gradient[of].toarray(), by_strains[of]])
+        return out
 
     def measure(self, pressure):
         """WallContact of the gap with the largest force, `pressure` (MPa) being that of the air."""
@@ -111,12 +119,6 @@ class CellContact:
 def _mean_normal(facets):
     a, b, c = (facets[:, i] for i in range(3))
     return np.cross(b - a, c - a).sum(axis=0) / 2
-
-
-def changed(then, now):
-    """Part of the contact stiffnesses {place: N/mm} that has come or gone."""
-    total = max(sum(then.values()), sum(now.values()))
-    return sum(abs(now.get(p, 0.0) - then.get(p, 0.0)) for p in then.keys() | now.keys()) / total if total else 0.0
 
 
 class _Sheet:
@@ -166,8 +168,7 @@ class _Side:
         return local.reshape(len(f), 36), np.einsum("cnis,cni->s", self._motion(), f)[_ORDER]
 
     def second_derivatives(self):
-        """Of the energy at fixed pressures: sparse (unknowns, unknowns), (unknowns, 6), (6, 6). And the gap's first derivatives: sparse
-        (points, unknowns), (points, 6)."""
+        """Of the energy at fixed pressures: sparse (unknowns, unknowns), (unknowns, 6), (6, 6)."""
         t, D, pairs = self.touching, self._motion(), len(self.s)
         f, H = t.forces, -t.push[:, None, None] * t.bend
         HD = (H @ D.reshape(pairs, 36, 6)).reshape(pairs, 12, 3, 6)
@@ -185,10 +186,15 @@ class _Side:
         own += np.einsum("ca,cast->st", self.s**2, self._jacobian.slope(wrench.reshape(-1, 6)).reshape(*self.s.shape, 6, 6))
         by_place = np.cross(D, f[..., None], axisa=-2, axisb=-2, axisc=-2)  # d(x x f)
         own += np.einsum("cais,cait->st", self._rates[..., :3, :], by_place)
-        # the gap's
-        local = np.einsum("caji,caj->cai", self.rotation, t.gradient).reshape(pairs, 36)
+        return bend, coupling[:, _ORDER], own[np.ix_(_ORDER, _ORDER)]
+
+    @cached_property
+    def gap_gradients(self):
+        """First derivatives of the gaps: sparse (points, unknowns), (points, 6)."""
+        t = self.touching
+        local = np.einsum("caji,caj->cai", self.rotation, t.gradient).reshape(len(self.s), 36)
         points = np.broadcast_to(t.point[:, None], local.shape)[self.kept]
         gradient = sp.coo_matrix((local[self.kept], (points, self.columns[self.kept])), shape=(len(t.area), self.unknowns)).tocsr()
         by_strains = np.zeros((len(t.area), 6))
-        np.add.at(by_strains, t.point, np.einsum("cais,cai->cs", D, t.gradient))
-        return bend, coupling[:, _ORDER], own[np.ix_(_ORDER, _ORDER)], gradient, by_strains[:, _ORDER]
+        np.add.at(by_strains, t.point, np.einsum("cais,cai->cs", self._motion(), t.gradient))
+        return gradient, by_strains[:, _ORDER]

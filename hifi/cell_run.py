@@ -105,13 +105,17 @@ def _follow(case, problem, on_state, on_limit_point, on_touch):
         system.destroy()
 
 
-def _first_touch(distances):
+def _first_touch(known):
     """Pressure at which the wall distance passes zero, from (pressure, distance) of which the last is the first that is not above.
 
-    With contact the first state in touch is known to be close to it: the path takes no step across a deep overlap.
+    Without contact an interpolation, with it an extrapolation of the three before: the last says no more than that walls touch, but
+    close to it, for the path takes no step across a deep overlap.
     """
-    pressures, gaps = np.array(distances[-3:]).T
-    return float(sum(p * w for p, w in zip(pressures, lagrange_coefficients(gaps, 0.0))))
+    pressures, gaps = np.array(known[-3:] if known[-1][1] < 0 else known[-4:-1]).T
+    if len(gaps) < 3:
+        return known[-1][0]
+    touch = sum(p * w for p, w in zip(pressures, lagrange_coefficients(gaps, 0.0)))
+    return float(np.clip(touch, known[-2][0], known[-1][0]))
 
 
 def _hold(problem, free, case, options, on_step):

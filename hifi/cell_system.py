@@ -7,6 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from base.strains import RodStrains
+from hifi.contact_update import ContactUpdate
 from hifi.solver import DirectSolver
 
 #: of mu pitch^2, the size of the forces in a cell
@@ -155,16 +156,29 @@ class CellSystem:
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
         self._influence = self._solver.solve_many(self._mixed)
         self._condensed = self._curvature - self._mixed.T @ self._influence
+        self._update = ContactUpdate(self.problem.contact.stiffnesses() if self.problem.contact else {})
+
+    def renew(self):
+        """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
+        return self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve) if self.problem.contact else False
+
+    def _gap_gradients(self, points):
+        rows, n = self.problem.contact.gradients(points), self.problem.unknowns
+        return np.hstack([rows[:, :n], np.zeros((len(rows), 6)), rows[:, n:][:, self._free] / self.pitch])
 
     def solve(self, right):
-        """K^-1 right in (unknowns, multipliers, free strains times pitch): bordering, with the factorised tangent."""
+        """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was renewed."""
+        return self._update.corrected(self._solve(right[:, None])[:, 0])
+
+    def _solve(self, right):
+        """K^-1 right (., columns) with the factorised tangent: bordering."""
         free, n = self._free, self.problem.unknowns + 6
-        z = self._solver.solve(right[:n])
+        z = self._solver.solve_many(right[:n])
         if not len(free):
             return z
         C = self._condensed[np.ix_(free, free)]
         q = np.linalg.solve(C, right[n:] * self.pitch - self._mixed[:, free].T @ z)
-        return np.concatenate([z - self._influence[:, free] @ q, q * self.pitch])
+        return np.vstack([z - self._influence[:, free] @ q, q * self.pitch])
 
     @property
     def unstable(self):
@@ -172,10 +186,6 @@ class CellSystem:
         free = self._condensed[np.ix_(self._free, self._free)]
         inner = self._solver.negative_pivots - self.problem.constraints - 6
         return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))
-
-    @property
-    def stale(self):
-        return bool(self.problem.contact) and self.problem.contact.stale
 
     @property
     def overreach(self):

@@ -6,15 +6,15 @@ A *system* (hifi.body, hifi.cell_system) has a state (an array), a scalar `load`
     factorise(), solve((n,)) -> (n,)      the tangent at the current state; K^-1 times an array, K possibly an older one
     moved(state, increment), dot(a, b)    retraction and inner product (over all ranks)
     volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state (None: unknown)
-    stale, overreach                      of walls that touch: whether others do than when the tangent was factorised; how deep they
-                                          overlap at the last residual, over what a correction may make of it (hifi.wall_contact)
+    renew(), overreach                    of walls that touch: brings the tangent up to date with what touches now (hifi.contact_update);
+                                          how deep they overlap at the last residual, over what a correction may make of it
 A *control* (hifi.control) closes the equations for the load. Between factorisations, steps are corrected by the secants seen
 so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear Algebra Appl. 16, 2009): the residual
 that the past increments explain is removed before the lagged tangent sees the rest. One solve and one residual an iteration.
 On slender bodies a lagged tangent is no help once walls have bulged, however small the step. What it makes worse is taken
 back, which costs a solve, and the tangent is factorised where the correction started: steps can be many times longer.
-Where walls touch, each change of what touches asks for a new tangent (an active-set iteration), and corrections that drive walls
-far into each other, unseen by a tangent that knew of no contact there, are shortened.
+Where walls touch, each change of what touches renews the tangent (an active-set iteration), and corrections that drive walls far
+into each other, unseen by a tangent that knew of no contact there, are shortened.
 """
 
 from dataclasses import dataclass, field
@@ -27,6 +27,10 @@ from hifi.solver import NotConverged
 
 #: how often a correction is shortened at most
 SHORTENINGS = 4
+#: what a new tangent, and an updated one, must make of the residual where walls touch for the tangent to be updated further
+TANGENT_GAIN, UPDATE_GAIN = 0.2, 0.5
+#: tangents factorised for one step, after which it should have come closer where walls touch
+MOST_IN_CONTACT = 6
 
 
 @dataclass
@@ -60,7 +64,7 @@ class Newton:
         self.options = options or NewtonOptions()
         self.current = False  # whether there is a factorisation to lag
         self.factorised_at = None  # (state, load) of that factorisation
-        self.timings = {"residual": 0.0, "factorise": 0.0, "solve": 0.0}
+        self.timings = {"residual": 0.0, "factorise": 0.0, "renew": 0.0, "solve": 0.0}
 
     def timed(self, name, function, *arguments):
         start = perf_counter()
@@ -83,22 +87,28 @@ class Newton:
         o, system, control = self.options, self.system, self.control
         r, norm, scale = self.residual()
         history, secants = [norm], Secants(system, o.secants)
-        since, fresh = [norm], False  # residuals that the lagged tangent has left; whether it is of the present state
+        factorised, due, since, fresh = 0, False, [norm], False  # residuals that the lagged tangent has left; whether it is of the present state
         for iteration in range(o.maximum_iterations + 1):
             tolerance = o.relative_tolerance * scale + o.absolute_tolerance
             if norm <= tolerance and control.satisfied(system, parameter):
                 return NewtonResult(iteration, history)
-            if not self.current or system.stale or iterations_left(since, tolerance) > o.patience:
+            renewed = self.current and not due and self.timed("renew", system.renew)
+            if not self.current or due or renewed is None or iterations_left(since, tolerance) > o.patience:
                 self.factorise()
+                renewed, fresh = True, True
+                factorised += 1
+                if factorised > MOST_IN_CONTACT and system.overreach > 0 and norm > 0.1 * history[0]:
+                    raise NotConverged(f"residual {norm:.1e} N after {factorised} tangents: what touches does not settle")
+            if renewed:
                 secants.forget()
-                since, fresh = [], True
+                since = []
             state, load = system.state.copy(), system.load
             step, load_step = self.timed("solve", self._correction, r, parameter, secants)
             system.state = system.moved(state, step)
             system.load += load_step
             before = system.overreach
             new, new_norm, new_scale = self.residual()
-            for _ in range(SHORTENINGS * fresh):
+            for _ in range(SHORTENINGS):
                 if system.overreach <= 1.0 and np.isfinite(new_norm):
                     break
                 fraction = (1.0 - before) / (system.overreach - before) if np.isfinite(new_norm) else 0.3
@@ -111,6 +121,8 @@ class Newton:
                 # worse by a lagged tangent: take the correction back and factorise where it started
                 system.state, system.load, self.current = state, load, False
                 continue
+            # what touches changes by much: iterate on it with new tangents until they reduce the residual
+            due = system.overreach > 0 and bool(renewed) and not new_norm < (TANGENT_GAIN if fresh else UPDATE_GAIN) * norm
             secants.add(step, load_step, new - r)
             r, norm, scale, fresh = new, new_norm, new_scale, False
             since.append(norm)

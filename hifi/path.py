@@ -114,7 +114,7 @@ class EquilibriumPath:
                 raise PredictorTooFar("the predicted state is beyond what the material's law allows")
             if system.overreach > 1.0 and not self._touching:
                 raise PredictorTooFar("the predicted walls overlap")
-            if not norm <= self.trusted * scale:
+            if not norm <= self.trusted * scale and not self._touching:
                 raise PredictorTooFar(f"the predicted state is off by {norm / scale:.1e} of the load")
             result = newton.solve(parameter)
         except NotConverged as error:
