@@ -3,13 +3,15 @@
 import numpy as np
 from mpi4py import MPI
 
+from hifi.contact_update import ContactUpdate
 from hifi.solver import DirectSolver
+
+#: changes of touch above which a tangent is factorised anew
+MOST_TOUCHES = 60
 
 
 class BodySystem:
     """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each linear in it."""
-
-    overreach = 0.0  # no contact
 
     def __init__(self, problem, coordinates, apply_load):
         self.problem, self.coordinates, self.apply_load = problem, coordinates, apply_load
@@ -65,15 +67,30 @@ class BodySystem:
         self.problem.assemble_tangent(self._matrix)
         self.solver.factorise()
         self._rotation_then = self._rotations()
+        contact = self.problem.contact
+        self._update = ContactUpdate(contact.stiffnesses() if contact else {}, MOST_TOUCHES, self.comm.allreduce)
+
+    @property
+    def overreach(self):
+        return self.problem.contact.overreach if self.problem.contact else 0.0
 
     def renew(self):
-        return False
+        """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
+        contact = self.problem.contact
+        return self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns) if contact else False
+
+    def _solve_columns(self, right):
+        return np.column_stack([self._solve(column) for column in right.T])
 
     def _rotations(self):
         return self.coordinates.sections(self.coordinates.nodes + self.problem.displacement())[:, :3, :3]
 
     def solve(self, right):
-        """(owned dofs,) approximation of K^-1 right at the current state.
+        """(owned dofs,) approximation of K^-1 right at the current state, K as it was renewed."""
+        return self._update.corrected(self._solve(right))
+
+    def _solve(self, right):
+        """(owned dofs,) approximation of K^-1 right with the factorised tangent.
 
         The factorised tangent is turned with the body: a rigidly rotated part has the tangent R K R^T, so a lagged
         one serves as long as the *strains* have not changed much, whatever the sections' rotations.

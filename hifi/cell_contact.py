@@ -12,15 +12,12 @@ import scipy.sparse as sp
 
 from base.left_jacobian import LeftJacobian
 from hifi import surface
-from hifi.wall_contact import touching
+from hifi.wall_contact import DEEPEST, mean_normal, touching
 from hifi.walls import IN_CONTACT, WallContact, distances_from
 
 #: strains (e, k) from twists (k, e)
 _ORDER = [3, 4, 5, 0, 1, 2]
 
-
-#: of the gap: corrections are shortened to this overlap
-DEEPEST = 0.1
 
 class CellContact:
     """Contact in the gaps of `walls` (hifi.walls.CellWalls) under a hifi.wall_contact.WallPenalty."""
@@ -34,7 +31,7 @@ class CellContact:
         for gap in walls.gaps:
             rest = [problem.nodes[f] + np.multiply.outer(s, [[1, 0, 0]]) for f, s in gap]
             middle = np.mean([r[..., 0].mean() for r in rest])
-            normal = _mean_normal(rest[0]) - _mean_normal(rest[1])
+            normal = mean_normal(rest[0]) - mean_normal(rest[1])
             sheets = [
                 _Sheet(f, problem.nodes[f][..., 0] + s[:, None] - middle, surface.reference_areas(problem, f)) for f, s in gap
             ]
@@ -86,14 +83,14 @@ class CellContact:
 
     def stiffnesses(self):
         """{point: N/mm} at the last residual."""
-        return {point: value for side in self._now for point, value in side.stiffnesses().items()}
+        return {point: value for side in self._now for point, value in side.touching.stiffnesses(side.number).items()}
 
     def gradients(self, points):
         """(m, unknowns + 6): how the gaps of points that push, or did so at the last tangent, change with unknowns and strains."""
         out = np.zeros((len(points), self.problem.unknowns + 6))
         places = {p: i for i, p in enumerate(points)}
         for side in [*self._then, *self._now]:
-            rows = [(places[p], row) for row, p in enumerate(side.stiffnesses()) if p in places]
+            rows = [(places[p], row) for row, p in enumerate(side.touching.stiffnesses(side.number)) if p in places]
             if rows:
                 to, of = np.array(rows).T
                 gradient, by_strains = side.gap_gradients
@@ -114,11 +111,6 @@ class CellContact:
                 gaps[gap] = WallContact(0.0, c.area + t.area[pushing].sum(), np.fmin(c.nearest, d.min()), np.fmax(c.farthest, d.max()))
         forces = np.linalg.norm(totals, axis=1)
         return replace(gaps[forces.argmax()], force=float(forces.max()))
-
-
-def _mean_normal(facets):
-    a, b, c = (facets[:, i] for i in range(3))
-    return np.cross(b - a, c - a).sum(axis=0) / 2
 
 
 class _Sheet:
@@ -150,11 +142,6 @@ class _Side:
         #: twists (n, 12, 6, 6) by the strains' twist (k, e)
         self._rates = self.s[..., None, None] * self._jacobian.matrix.reshape(*self.s.shape, 6, 6)
         self.rotation = self._jacobian.pose[:, :3, :3].reshape(*self.s.shape, 3, 3)
-
-    def stiffnesses(self):
-        """{(side, facet, Gauss point): N/mm}."""
-        t = self.touching
-        return {(self.number, *name): value for name, value in zip(t.name.tolist(), t.area * t.slope)}
 
     def _motion(self):
         """(n, 12, 3, 6): dx by the strains (k, e)."""

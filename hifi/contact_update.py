@@ -6,8 +6,6 @@ takes it away. Its column K^-1 g costs one solve, much less than a factorisation
 
 import numpy as np
 
-#: columns above which a factorisation is cheaper
-MOST = 200
 #: of the largest stiffness of a point: smaller changes are left to the iterations
 SMALLEST = 0.02
 
@@ -15,7 +13,10 @@ SMALLEST = 0.02
 class ContactUpdate:
     """K^-1 of a factorised tangent K, corrected to (K + U^T D U)^-1: U the gap gradients (m, n), D stiffness changes (m,) in N/mm."""
 
-    def __init__(self, stiffnesses=None):
+    def __init__(self, stiffnesses=None, most=200, total=lambda part: part):
+        """stiffnesses: {point: N/mm} in the factorised tangent. most: columns above which a factorisation is cheaper. total: sums
+        over the ranks that hold parts of (n,)."""
+        self._most, self._total = most, total
         self._then, self._places = stiffnesses or {}, {}
         self._rows = self._columns = None
         self._changes = np.zeros(0)
@@ -28,9 +29,9 @@ class ContactUpdate:
         """
         then, places = self._then, self._places
         largest = max([*now.values(), *then.values()], default=0.0)
-        changes = {p: now.get(p, 0.0) - then.get(p, 0.0) for p in now.keys() | then.keys()}
+        changes = {p: now.get(p, 0.0) - then.get(p, 0.0) for p in sorted(now.keys() | then.keys())}
         new = [p for p, change in changes.items() if p not in places and abs(change) > SMALLEST * largest]
-        if len(places) + len(new) > MOST:
+        if len(places) + len(new) > self._most:
             return None
         if new:
             rows = gradients(new)
@@ -45,5 +46,6 @@ class ContactUpdate:
         """(K + U^T D U)^-1 r from `solution` (n,) = K^-1 r."""
         if self._rows is None:
             return solution
-        inner = np.eye(len(self._changes)) + self._changes[:, None] * (self._rows @ self._columns)
-        return solution - self._columns @ np.linalg.solve(inner, self._changes * (self._rows @ solution))
+        known = self._total(self._rows @ np.column_stack([self._columns, solution]))
+        inner = np.eye(len(self._changes)) + self._changes[:, None] * known[:, :-1]
+        return solution - self._columns @ np.linalg.solve(inner, self._changes * known[:, -1])

@@ -10,6 +10,7 @@ from geometry import cad
 from geometry.loading import DeadLoads
 from hifi import compat
 from hifi.body import BodySystem
+from hifi.body_contact import BodyContact
 from hifi.control import ArcLength, LoadControl, VolumeControl
 from hifi.loads import EndLoad, Gravity, Pressure
 from hifi.path import EquilibriumPath
@@ -55,9 +56,10 @@ class Measured:
 class ManipulatorSolve:
     """The boundary value problem of a meshed manipulator with everything that is measured on it."""
 
-    def __init__(self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False, loads=None, hold_tip=False):
+    def __init__(self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False, loads=None, hold_tip=False, contact=None):
         """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh. loads:
-        geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at rest."""
+        geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at rest. contact: the hifi.wall_contact.WallPenalty
+        between the walls of neighbouring chambers; without it they may pass through each other."""
         self.manipulator, self.comm, self.newton_options = manipulator, comm, newton_options
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
         if flip_y:
@@ -73,6 +75,10 @@ class ManipulatorSolve:
         self.system = BodySystem(self.problem, coordinates, self._set_pressure)
         self.sections = SectionFrames(self.problem, manipulator)
         self.walls = WallDistances(self.problem, manipulator)
+        if contact:
+            owners = [manipulator.segments[number - 1] for number, _, _, _ in self.walls.gaps]
+            laws = [contact.on(s.material.mu, s.gap) for s in owners]
+            self.problem.contact = BodyContact(self.problem, self.walls, laws, [s.gap for s in owners]) if laws else None
         self.stretch = PrincipalStretch(self.problem)
         #: hifi.stepping.Step of the last accepted state
         self.last_step = None

@@ -61,6 +61,8 @@ class MixedProblem:
         self.fixed_dofs = np.unique(np.concatenate([bc.dof_indices()[0] for bc in self.bcs] + [np.zeros(0, np.int32)]))
         self._fixed_owned = self.fixed_dofs[self.fixed_dofs < self.owned]
         self.loads = list(loads)
+        #: hifi.body_contact.BodyContact, where walls are held apart
+        self.contact = None
         self.symmetric = all(load.closed for load in self.loads)
 
         u, p = ufl.split(self.state)
@@ -164,6 +166,8 @@ class MixedProblem:
         The scale is the larger of the loads' and the support reactions' norm; supported entries are zero.
         """
         r, external = self._assemble(self._internal), self.external_force()
+        if self.contact:
+            r += self.contact.residual()
         scale = self._sum(external @ external)
         r += external
         reactions = r[self._fixed_owned]
@@ -195,6 +199,9 @@ class MixedProblem:
         A.zeroEntries()
         fem.petsc.assemble_matrix(A, self._tangent, bcs=self.bcs)
         A.assemble()
+        if self.contact:
+            self.contact.add_tangent(A)
+            A.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         return A
 
     def _sum(self, value):

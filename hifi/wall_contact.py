@@ -25,6 +25,10 @@ _BLEND = 0.05
 _STEEPEST = 0.2
 
 
+#: of the gap: corrections are shortened to this overlap (hifi.newton)
+DEEPEST = 0.1
+
+
 @dataclass(frozen=True)
 class WallPenalty:
     """pressure (MPa) between walls over their overlap (mm): `stiffness` mu / gap, of the body's mu and the gap at rest.
@@ -85,10 +89,20 @@ class Touching:
         """(c,) N: minus the derivative of the energy by the gap, for each pair."""
         return (self.area * self.pressure)[self.point]
 
+    def stiffnesses(self, side):
+        """{(side, facet, Gauss point): N/mm}, in the order of the points."""
+        return {(side, *name): value for name, value in zip(self.name.tolist(), self.area * self.slope)}
+
     @property
     def forces(self):
         """(c, 12, 3) N: how the energy changes with the nodes."""
         return -self.push[:, None, None] * self.gradient
+
+
+def mean_normal(facets):
+    """(3,) area (mm2) of facets (n, 6, 3) as a vector; edges taken straight."""
+    a, b, c = (facets[:, i] for i in range(3))
+    return np.cross(b - a, c - a).sum(axis=0) / 2
 
 
 def touching(points, areas, wall, direction, law, share=0.5):

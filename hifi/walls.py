@@ -44,7 +44,7 @@ class WallDistances:
         self.problem, self.comm = problem, problem.mesh.comm
         facets = surface.facet_nodes(problem, cad.OUTER)
         corners = problem.nodes[facets[:, :3]]
-        self._local, wall_of_facet, self.gaps = [], [], []
+        self.facets, wall_of_facet, self.gaps = [], [], []
         wall = 0
         for i, (segment, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
             half = segment.chamber_thickness / segment.sin / 2
@@ -55,18 +55,20 @@ class WallDistances:
                 for gap, (x0, x1) in enumerate(zip(centres[:-1] + half, centres[1:] - half), start=1):
                     for x in (x0, x1):
                         chosen = np.flatnonzero(above & (np.abs(along - x) < _TOLERANCE).all(axis=1))
-                        self._local.append(facets[chosen])
+                        self.facets.append(facets[chosen])
                         wall_of_facet += [wall] * len(chosen)
                         wall += 1
                     self.gaps.append((i + 1, "top" if side > 0 else "bottom", gap, segment.gap))
-        self._local = np.concatenate(self._local) if self._local else np.zeros((0, 6), int)
-        gathered = self.comm.gather(np.array(wall_of_facet, int), root=0)
+        self.facets = np.concatenate(self.facets) if self.facets else np.zeros((0, 6), int)
+        #: (facets,) of this rank: walls 2 g and 2 g + 1 face each other across gap g
+        self.wall_of_facet = np.array(wall_of_facet, int)
+        gathered = self.comm.gather(self.wall_of_facet, root=0)
         self._wall = np.concatenate(gathered) if self.comm.rank == 0 else None
         self.reference = self._gather(problem.nodes)
 
     def _gather(self, positions):
         """(facets of all ranks, 6, 3) on rank 0, None elsewhere."""
-        parts = self.comm.gather(positions[self._local], root=0)
+        parts = self.comm.gather(positions[self.facets], root=0)
         return np.concatenate(parts) if self.comm.rank == 0 else None
 
     def distances(self, array=None):
