@@ -58,8 +58,8 @@ class BodyContact:
     def residual(self):
         """(owned dofs,) how the energy stored in overlaps changes with the dofs."""
         self._now, zero = self._touching(), sp.csr_matrix((self._size, 1))
-        deepest = max((s.touching.overlap.max() + self._laws[s.number // 2].onset) / self._gaps[s.number // 2] for s in self._now) if self._now else 0.0
-        self.overreach = self.comm.allreduce(deepest, op=MPI.MAX) / DEEPEST
+        deep = [(s.touching.overlap.max() + self._laws[s.number // 2].onset) / self._gaps[s.number // 2] for s in self._now]
+        self.overreach = self.comm.allreduce(max(deep, default=0.0), op=MPI.MAX) / DEEPEST
         if not self.overreach:
             return np.zeros(self._owned.stop - self._owned.start)
         return self._sum([zero, *(s.forces() for s in self._now)]).toarray()[:, 0]
@@ -117,9 +117,9 @@ class _Side:
 
     def gradient(self):
         """Sparse (points, dofs): of the gaps."""
-        t = self.touching
+        t, dofs = self.touching, self._dofs[self._kept]
         points = np.broadcast_to(t.point[:, None], self._dofs.shape)[self._kept]
-        return sp.coo_matrix((t.gradient.reshape(-1, 36)[self._kept], (points, self._dofs[self._kept])), shape=(len(t.area), self._size)).tocsr()
+        return sp.coo_matrix((t.gradient.reshape(-1, 36)[self._kept], (points, dofs)), shape=(len(t.area), self._size)).tocsr()
 
     def tangent(self):
         """Sparse (dofs, dofs)."""

@@ -28,7 +28,8 @@ class CellCase:
 
     held: {index of (e, k): prescribed value, 1/mm for k}; reached from the free state at the top pressure. control:
     'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor` times the volume at rest.
-    contact: 'auto': walls that touch are held apart by the `penalty`; 'third-medium': by the `medium` in the gap; 'none'. graded: elements shrink to mesh_size * EDGE at the body's edges, where stresses are singular.
+    contact: 'auto': walls that touch are held apart by the `penalty`; 'third-medium': by the `medium` in the gap;
+    'none': they pass through each other. graded: elements shrink to mesh_size * EDGE at the body's edges, where stresses are singular.
     """
 
     segment: Segment

@@ -56,10 +56,12 @@ class Measured:
 class ManipulatorSolve:
     """The boundary value problem of a meshed manipulator with everything that is measured on it."""
 
-    def __init__(self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False, loads=None, hold_tip=False, contact=None):
+    def __init__(
+        self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False, loads=None, hold_tip=False, contact=None
+    ):
         """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh. loads:
-        geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at rest. contact: the hifi.wall_contact.WallPenalty
-        between the walls of neighbouring chambers; without it they may pass through each other."""
+        geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at rest.
+        contact: the hifi.wall_contact.WallPenalty between neighbouring chambers; without it they may pass through each other."""
         self.manipulator, self.comm, self.newton_options = manipulator, comm, newton_options
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
         if flip_y:

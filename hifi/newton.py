@@ -24,7 +24,6 @@ import numpy as np
 
 from hifi.solver import NotConverged
 
-
 #: how often a correction is shortened at most
 SHORTENINGS = 4
 #: what a new tangent, and an updated one, must make of the residual where walls touch for the tangent to be updated further
@@ -87,7 +86,8 @@ class Newton:
         o, system, control = self.options, self.system, self.control
         r, norm, scale = self.residual()
         history, secants = [norm], Secants(system, o.secants)
-        factorised, due, since, fresh = 0, False, [norm], False  # residuals that the lagged tangent has left; whether it is of the present state
+        since, fresh = [norm], False  # residuals that the lagged tangent has left; whether it is of the present state
+        factorised, due = 0, False  # tangents so far; whether walls that touch ask for the next
         for iteration in range(o.maximum_iterations + 1):
             tolerance = o.relative_tolerance * scale + o.absolute_tolerance
             if norm <= tolerance and control.satisfied(system, parameter):

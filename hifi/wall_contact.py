@@ -215,5 +215,6 @@ def _under(points, facets):
 
 def _solve2(A, b):
     """Solutions (..., 2) of 2 x 2 systems."""
-    det = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
-    return np.stack([A[..., 1, 1] * b[..., 0] - A[..., 0, 1] * b[..., 1], A[..., 0, 0] * b[..., 1] - A[..., 1, 0] * b[..., 0]], -1) / det[..., None]
+    (a, c), (d, e) = np.moveaxis(A, (-2, -1), (0, 1))
+    x, y = np.moveaxis(b, -1, 0)
+    return np.stack([e * x - c * y, a * y - d * x], axis=-1) / (a * e - c * d)[..., None]
