@@ -8,13 +8,13 @@ from base.errors import InputError
 from base.files import write_text
 from base.materials import material_from_table, material_to_table
 from base.tables import as_table, from_table, number, read_toml, refuse_unknown, to_table, toml_text
-from geometry.loading import CONTROL_KEYS, Control, DeadLoads, Extras, read_control, read_extras
+from geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_contact, read_control, read_extras
 from geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
 KEYS = [
     *("schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "layer_material", "segment", "base", "result"),
-    *("loads", "measure", *CONTROL_KEYS),
+    *("loads", "measure", "contact", *CONTROL_KEYS),
 ]
 
 
@@ -24,7 +24,8 @@ class Design:
 
     pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm; target: text
     that names the target file; result: free table of numbers that `pneunet design` adds and nobody reads back. loads,
-    control and measure are for the finite elements alone; a pressure of 0 goes with loads only.
+    control, measure and contact ('auto': walls of neighbouring chambers that touch are held apart; 'none': they are not) are for the
+    finite elements alone; a pressure of 0 goes with loads only.
     """
 
     manipulator: Manipulator
@@ -37,6 +38,7 @@ class Design:
     loads: DeadLoads = DeadLoads()
     control: Control = Control()
     measure: Extras = Extras()
+    contact: str = CONTACTS[0]
 
 
 def read_design(path):
@@ -83,6 +85,7 @@ def design_from_tables(data, path):
         loads=loads,
         control=read_control(data, str(path)),
         measure=read_extras(data.get("measure", {}), f"{path} [measure]"),
+        contact=read_contact(data, str(path)),
     )
 
 
@@ -136,6 +139,8 @@ def design_tables(design):
         "mesh_size_mm": design.mesh_size,
     }
     tables |= design.control.table()
+    if design.contact != CONTACTS[0]:
+        tables["contact"] = design.contact
     if design.target:
         tables["target"] = design.target
     tables["material"] = material_to_table(first)

@@ -80,6 +80,18 @@ def read_control(table, where):
     return Control(name, **values)
 
 
+#: of the walls of neighbouring chambers: held apart where they touch, or not
+CONTACTS = ("auto", "none")
+
+
+def read_contact(table, where):
+    """The `contact` among the keys of a file's top table; InputError otherwise."""
+    name = table.get("contact", CONTACTS[0])
+    if name not in CONTACTS:
+        raise InputError(f"{where}: contact = {name!r} is not known: write 'auto' or 'none'")
+    return name
+
+
 @dataclass(frozen=True)
 class Extras:
     """What is computed at the end beside the shape; see hifi.tip."""
