@@ -24,9 +24,9 @@ SEGMENT_KEYS = [file_key(f) for f in fields(Segment) if "unit" in f.metadata]
 MATERIAL_KEYS = ["silicone", "law"] + sorted({file_key(f) for law in LAWS.values() for f in fields(law)} - {"name", "source"})
 #: keys which say what a material is: the table that stood there before means nothing any more
 NAMES_OF_MATERIALS = ("silicone", "law")
-#: values at the top of a CELL.toml, and of a design.toml too
-CELL_KEYS = ("pressure_kPa", "mesh_size_mm", "control", "volume_factor")
-COMMON_KEYS = CELL_KEYS[:2]
+#: values at the top of a design.toml and of a CELL.toml, and at that of the latter alone
+COMMON_KEYS = ("pressure_kPa", "mesh_size_mm", "contact")
+CELL_KEYS = (*COMMON_KEYS, "control", "volume_factor")
 DEFAULT_LEVELS = 10
 #: s; one case
 DEFAULT_TIME = 3600.0
