@@ -80,8 +80,8 @@ class BodyDistance:
         for n in order[between[order] <= within]:
             near[i[n]].append(j[n])
             near[j[n]].append(i[n])
-        return float(min(self._from(a, np.concatenate([self._slabs[b] for b in others]), x, within, reach, open_)
-                         for a, others in enumerate(near) if others))
+        found = [self._from(a, np.concatenate([self._slabs[b] for b in n]), x, within, reach, open_) for a, n in enumerate(near) if n]
+        return float(min(found))
 
     def _from(self, a, others, x, within, reach, open_):
         """Smallest distance of nodes of slab a, of those that matter, from the surface of the far parts that holds the nodes `others`."""

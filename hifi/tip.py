@@ -45,6 +45,7 @@ def stiffness(solve):
     K = np.linalg.inv(compliance(solve.system, cad.TIP, frame))
     return {
         "pressure_kPa": float(solve.pressure.value.value) * 1e3,
+        **solve.measure().touch.marks,
         "rows": "force_N, moment_N_mm; columns: displacement_mm, rotation_rad; in axes and about origin of the tip's section frame",
         "frame_origin_mm": frame[:3, 3].tolist(),
         "frame_axes": frame[:3, :3].T.tolist(),
@@ -71,6 +72,7 @@ def blocked_force(manipulator, mesh_path, pressure, loads, comm):
     return {
         "pressure_kPa": measured.pressure * 1e3,
         "reached": reached,
+        **measured.touch.marks,
         "force_N": (-force).tolist(),
         "moment_N_mm": (-moment).tolist(),
         "unstable_directions": measured.unstable,

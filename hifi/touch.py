@@ -12,9 +12,8 @@ import numpy as np
 from hifi.stepping import lagrange_coefficients
 
 KPA = 1e3  # kPa per MPa
-#: columns by which every table of a manipulator marks its rows
+#: columns by which every table of a manipulator marks its rows, 0 or 1
 MARKS = ("walls_overlap", "body_overlap")
-WALLS_OVERLAP, BODY_OVERLAP = "walls overlap", "body overlap"
 
 
 @dataclass(frozen=True)
@@ -54,13 +53,13 @@ class Touch:
 
     @property
     def marks(self):
-        """Values of the columns MARKS, 0 or 1."""
-        return [int(self.walls_overlap), int(self.body_overlap)]
+        """{column of MARKS: bool}."""
+        return {name: getattr(self, name) for name in MARKS}
 
     @property
     def warnings(self):
         """Short words on what makes the state doubtful."""
-        return [WALLS_OVERLAP] * self.walls_overlap + [BODY_OVERLAP] * self.body_overlap
+        return [name.replace("_", " ") for name, holds in self.marks.items() if holds]
 
     @property
     def text(self):
@@ -72,20 +71,19 @@ class Touch:
     def news(self, before):
         """Sentences on what this state has met and the one `before` it had not."""
         if self.walls_from and not before.walls_from:
-            then = "held apart by contact" if self.contact else f"no contact model: states from here on are marked '{WALLS_OVERLAP}'"
+            then = "held apart by contact" if self.contact else "contact is not modelled, states from here on are marked 'walls overlap'"
             yield f"walls of neighbouring chambers touch at {self.walls_from}: {then}"
         if self.body_from and not before.body_from:
             yield (
-                f"parts of the body that are far apart along it touch at {self.body_from}: not modelled, states from here on are "
-                f"marked '{BODY_OVERLAP}'"
+                f"parts of the body that are far apart along it touch at {self.body_from}: this is not modelled, states from here on "
+                "are marked 'body overlap'"
             )
 
     def table(self):
         """run.json's part: pressures in kPa, null where nothing has touched."""
         return {
             "contact": self.contact,
-            "walls_overlap": self.walls_overlap,
-            "body_overlap": self.body_overlap,
+            **self.marks,
             "first_touch_kPa": self.walls_from and self.walls_from.pressure * KPA,
             "first_touch_dead_load_fraction": self.walls_from and self.walls_from.dead_loads,
             "first_body_touch_kPa": self.body_from and self.body_from.pressure * KPA,
