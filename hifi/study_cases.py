@@ -27,7 +27,7 @@ def solve_cell_case(inputs, directory):
     """One cell: `inputs` are the tables of a CELL.toml. Returns the facts of its mesh."""
     case = cell_from_tables(inputs, "the case")
     write_text(directory / "cell.toml", toml_text(inputs))
-    breaks_at, rows = break_stretch(Manipulator((case.segment,))), []
+    breaks_at, rows, touched = break_stretch(Manipulator((case.segment,))), [], []
 
     def keep(state):
         rows.append(
@@ -35,6 +35,7 @@ def solve_cell_case(inputs, directory):
                 "pressure_kPa": state.pressure * KPA,
                 **_strains(state.strains.e, state.strains.k),
                 "smallest_wall_distance_mm": state.wall_distance,
+                "first_touch_kPa": touched[0] * KPA if touched else "",
                 "contact_force_N": state.contact.force if state.contact else 0.0,
                 **_body(state, breaks_at, {MARKS[0]: state.walls_overlap}),
                 **{name: getattr(state, name) for name in EFFORT},
@@ -42,7 +43,7 @@ def solve_cell_case(inputs, directory):
         )
         _write(directory, rows)
 
-    return {"mesh": solve_cell(case, directory / "cell.msh", keep)[1]}
+    return {"mesh": solve_cell(case, directory / "cell.msh", keep, on_touch=touched.append)[1]}
 
 
 def solve_design_case(inputs, directory):
@@ -67,6 +68,7 @@ def solve_design_case(inputs, directory):
             **strains,
             **{f"tip_{axis}_mm": value for axis, value in zip("xyz", m.frames[-1, :3, 3])},
             "smallest_wall_distance_mm": _finite(m.touch.wall_distance),
+            "first_touch_kPa": m.touch.walls_from.pressure * KPA if m.touch.walls_from else "",
             "body_distance_mm": _finite(m.touch.body_distance),
             **_body(m, breaks_at, m.touch.marks),
             **{"steps": m.step, "factorisations": sum(factorisations), "seconds": m.seconds},
