@@ -2,7 +2,8 @@
 
 Far apart means, along the undeformed axis, by more than the larger of a pitch and the diameter of the body: such parts can
 meet only where the body comes back to itself. Between them a node's distance is that from the deformed quadratic surface of
-the others; it is negative when the node lies inside their solid, by the winding number of their surface.
+the others; it is negative when the node lies inside their solid, by the winding number of their surface. As long as they are
+further apart than half the diameter, the distance of nodes from nodes is taken.
 
 The body is cut into slabs across its axis, so that a pair of them is far apart or not as a whole, and pairs are looked at in order
 of the distance of their bounding boxes: a straight body costs little more than its node trees.
@@ -71,6 +72,8 @@ class BodyDistance:
             if between[n] > nodes:
                 break
             nodes = min(nodes, trees[i[n]].query(x[self._slabs[j[n]]])[0].min())
+        if nodes > self.diameter / 2:
+            return float(nodes)
         # no point of a facet is further than half its longest edge from one of its nodes
         facets = x[self._facets]
         reach = np.linalg.norm(facets[:, [0, 1, 1, 2, 2, 0]] - facets[:, [3, 3, 4, 4, 5, 5]], axis=-1).max()
@@ -80,11 +83,15 @@ class BodyDistance:
         for n in order[between[order] <= within]:
             near[i[n]].append(j[n])
             near[j[n]].append(i[n])
-        found = [self._from(a, np.concatenate([self._slabs[b] for b in n]), x, within, reach, open_) for a, n in enumerate(near) if n]
-        return float(min(found))
+        best = np.inf
+        for a, others in enumerate(near):
+            if others:
+                best = min(best, self._from(a, np.concatenate([self._slabs[b] for b in others]), x, within, reach, open_, best))
+        return float(best)
 
-    def _from(self, a, others, x, within, reach, open_):
-        """Smallest distance of nodes of slab a, of those that matter, from the surface of the far parts that holds the nodes `others`."""
+    def _from(self, a, others, x, within, reach, open_, best):
+        """Smallest distance of nodes of slab a, of those that matter, from the surface of the far parts that holds the nodes `others`;
+        of depths only those that beat `best` matter."""
         points = self._slabs[a]
         points = points[cKDTree(x[others]).query(x[points], distance_upper_bound=within)[0] <= within]
         if not len(points):
@@ -97,7 +104,7 @@ class BodyDistance:
         distances = distances_from(x[self._facets[wall]], x[points])
         clear = np.abs(distances)
         if not open_:
-            behind = np.flatnonzero((distances < 0) & (clear < self.diameter / 2))
+            behind = np.flatnonzero((distances < min(best, 0)) & (clear < self.diameter / 2))
             behind = behind[np.argsort(distances[behind], kind="stable")]
             solid = np.concatenate([surface.subdivided(x[self._facets[wall]], 4), x[self._facets[far & ~wall][:, :3]]])
             for chunk in np.split(behind, range(_AT_ONCE, len(behind), _AT_ONCE)):
@@ -114,7 +121,7 @@ def winding_numbers(points, triangles):
     4 pi they tell inside from outside even where the surface is open, as that of the far parts is at its cuts.
     """
     a, b, c = np.moveaxis(triangles[None] - points[:, None, None], 2, 0)
-    la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
-    volume = np.einsum("...i,...i->...", a, np.cross(b, c))
-    dots = [np.einsum("...i,...i->...", p, q) * r for p, q, r in ((a, b, lc), (b, c, la), (c, a, lb))]
-    return np.arctan2(volume, la * lb * lc + sum(dots)).sum(axis=1) / (2 * np.pi)
+    ab, bc, ca, aa, bb, cc = (np.einsum("pti,pti->pt", *two) for two in ((a, b), (b, c), (c, a), (a, a), (b, b), (c, c)))
+    la, lb, lc = np.sqrt(aa), np.sqrt(bb), np.sqrt(cc)
+    volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
+    return np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum(axis=1) / (2 * np.pi)

@@ -106,7 +106,8 @@ def test_report_page_is_whole_and_self_contained(tmp_path):
     }  # fmt: skip
     assert page.count("data:image/png;base64,") == len(names)
     assert not re.search(r"(src|href)=\"(?!data:)", page) and str(tmp_path) not in page
-    assert "WALLS OVERLAP in 1 of" in page and page.count("OVERLAP, not proven: Walls overlap from") == 3 and "mpirun -n 2 pneunet solve" in page
+    assert "WALLS OVERLAP in 1 of" in page and page.count("OVERLAP, not proven: Walls overlap from") == 3
+    assert "mpirun -n 2 pneunet solve" in page
     assert f"{FACTOR:.3f}" in page  # FE / reduced of a curvature
 
 
