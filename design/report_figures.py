@@ -256,7 +256,7 @@ def wall_picture(run, folder):
                             linewidth=0.7,
                         )
                     )
-                    if distance < 0:
+                    if distance < 0 and not run.solve.contact:
                         ax.plot(x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False)
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
