@@ -129,13 +129,35 @@ def _errors(curve, reference):
     return None if curve is None or reference is None else compare(curve, reference)
 
 
-def overlap(run):
-    """Depth in mm of the deepest overlap of walls in the last step; 0 when no walls overlap."""
-    return max([0.0] + [-distance for *_, distance in run.solve.walls]) if run.solve else 0.0
+def overlaps(run):
+    """Sentences on what overlaps in the finite element solution: walls, parts of the body; [] when nothing does."""
+    solve, told = run.solve, []
+    if solve is None:
+        return told
+    if solve.walls_overlap:
+        depth = max([0.0] + [-distance for *_, distance in solve.walls])
+        now = f", by up to {depth:.2f} mm at the end" if depth > 0 else ""
+        told.append(f"Walls overlap {_from(solve.record, 'first_touch')}{now}; contact is not part of this solution")
+    if solve.body_overlap:
+        depth = -solve.steps["body_distance_mm"][-1]
+        now = f", by up to {depth:.2f} mm at the end" if depth > 0 else ""
+        told.append(
+            f"Parts of the body that are far apart along it overlap {_from(solve.record, 'first_body_touch')}{now}; their contact is "
+            "not modelled"
+        )
+    return told
+
+
+def _from(record, name):
+    """'from 7.3 kPa on' of run.json's first touch."""
+    pressure, dead = record.get(f"{name}_kPa"), record.get(f"{name}_dead_load_fraction")
+    if pressure is None:
+        return "at some load"
+    return f"from {pressure:.2f} kPa on" if pressure > 0 or not dead else f"from {100 * dead:.3g} % of the dead loads on"
 
 
 def verdict(run, comparison):
-    """The result in one honest sentence (two when walls overlap)."""
+    """The result in one honest sentence, and what forbids to trust it: a solution in which walls overlap confirms nothing."""
     c, design = comparison, run.design
     promise = ""
     if c.reduced_target:
@@ -150,6 +172,8 @@ def verdict(run, comparison):
     else:
         percent = c.reduced_solved.percent(c.reduced_solved.rms)
         word = "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
+        if overlaps(run):
+            word = "is no test of"
         sentence = (
             f"At {pressure} the finite element solution of the whole manipulator {word} the reduced prediction: "
             f"they differ by {_mm(c.reduced_solved)}, and |k| of a segment by up to {_strain_difference(run, c):.0f} %"
@@ -165,9 +189,8 @@ def verdict(run, comparison):
         sentence += f"; it {reason} the design pressure, {plain(design.pressure * 1e3)} kPa"
     if c.nearest and c.nearest[0] < run.solve.pressure:
         sentence += f". Its step nearest to the target is at {plain(c.nearest[0] * 1e3)} kPa, with {_mm(c.nearest[1])}"
-    depth = overlap(run)
-    if depth > 0:
-        sentence += f". Walls overlap by up to {depth:.2f} mm, so the finite element shape is not what a real body would take"
+    if overlaps(run):
+        sentence = "NOT PROVEN. " + ". ".join([sentence, *overlaps(run), "The finite element shape is not what a real body would take"])
     return sentence + "."
 
 

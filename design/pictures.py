@@ -2,30 +2,9 @@
 
 import numpy as np
 
-from base.files import atomic_path
+from base.rendering import camera_angles, figure, save
 from design.labels import STYLES, plain, segment_colour, segment_name, significant
 from design.rundata import read_run
-
-
-def camera_angles(points):
-    """(elevation, azimuth) in degrees from which a curve (n, 3) with z up is seen well: 25 degrees above, and across
-    its longest horizontal direction, turned by 30 degrees so that depth shows."""
-    flat = np.asarray(points)[:, :2] - np.mean(np.asarray(points)[:, :2], axis=0)
-    _, _, directions = np.linalg.svd(flat, full_matrices=False)
-    along = directions[0] * (1 if directions[0] @ (flat[-1] - flat[0]) >= 0 else -1)
-    return 25.0, float(np.degrees(np.arctan2(along[1], along[0]))) - 90.0 + 30.0
-
-
-def figure(width, height):
-    """A matplotlib Figure (inches) with the Agg canvas: no window, no global state."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), facecolor="white")
-
-
-def save(figure, path, dpi=120):
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=dpi)
 
 
 def equal_axes_3d(ax, points, pad=0.06):

@@ -4,10 +4,12 @@ import base64
 from html import escape
 from pathlib import Path
 
+import numpy as np
+
 from base.files import output_directory, write_text
 from base.record import revision
 from design import report_figures as figures
-from design.comparison import CONFIRMS, ROUGHLY, Comparison, overlap, stopped_short, verdict
+from design.comparison import CONFIRMS, ROUGHLY, Comparison, overlaps, stopped_short, verdict
 from design.drawing import draw_drawing, segment_table
 from design.labels import plain, segment_name, significant
 from design.rundata import read_run
@@ -125,8 +127,7 @@ def _headline(run, comparison):
     )
     out = f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b> {escape(designed)}</p>"
     out += f'<p class="verdict">{escape(verdict(run, comparison))}</p>'
-    if overlap(run) > 0:
-        out += f'<p class="alarm">WALLS OVERLAP by up to {overlap(run):.2f} mm in the finite element solution.</p>'
+    out += _alarms(run)
     out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
     if c.reduced_solved:
         out += (
@@ -134,6 +135,10 @@ def _headline(run, comparison):
             f'"roughly" at most {ROUGHLY:g} %, beyond that "contradicts".</p>'
         )
     return out
+
+
+def _alarms(run):
+    return "".join(f'<p class="alarm">OVERLAP, not proven: {escape(text)}.</p>' for text in overlaps(run))
 
 
 def _shapes(run, comparison, model, folder):
@@ -162,7 +167,8 @@ def _errors(comparison, run):
         (f"FE vs target{at}", comparison.solved_target),
         (f"reduced vs FE{at}", comparison.reduced_solved),
     ]
-    columns = [(name, e) for name, e in columns if e is not None]
+    mark = " (overlaps: not proven)" * bool(overlaps(run))
+    columns = [(name + mark * ("FE" in name), e) for name, e in columns if e is not None]
     if not columns:
         return _missing("There are no two curves to compare.")
 
@@ -202,7 +208,8 @@ def _strains(run, comparison):
             ratio = "-" if reduced is None or abs(reduced) < 10.0**-digits else f"{fe / reduced:.3f}"
             rows.append([label, told, _fixed(fe, digits), ratio])
     return (
-        _table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
+        _alarms(run)
+        + _table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
         + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not depend on "
         "that choice.</p>"
     )
@@ -220,17 +227,25 @@ def _history(run, model, folder):
 
 
 def _walls(run, folder):
-    if run.solve is None or not run.solve.walls:
-        return _missing("No wall distances: there is no finite element solution yet, or the body has no gaps.")
-    depth = overlap(run)
-    if depth > 0:
-        out = (
-            f'<p class="alarm">WALLS OVERLAP in {sum(d < 0 for *_, d in run.solve.walls)} of {len(run.solve.walls)} '
-            f"gaps, by up to {depth:.2f} mm. Contact is not part of this solution; a real body would be stopped.</p>"
+    if run.solve is None:
+        return _missing("No wall distances: there is no finite element solution yet.")
+    solve, distances = run.solve, [d for *_, d in run.solve.walls]
+    out, touching = _alarms(run), sum(d < 0 for d in distances)
+    if touching and solve.contact:
+        out += f"<p>Walls touch in {touching} of {len(distances)} gaps, held apart by a contact model.</p>"
+    elif touching:
+        out += f"<p>WALLS OVERLAP in {touching} of {len(distances)} gaps; a real body would be stopped.</p>"
+    elif distances:
+        out += f"<p>No walls touch in the last step: the smallest distance is {min(distances):.2f} mm.</p>"
+    far = solve.steps["body_distance_mm"][-1]
+    if np.isfinite(far):
+        out += (
+            f"<p>Coils and segments: the smallest distance between parts that are far apart along the body is {far:.2f} mm. "
+            "Contact between such parts is not modelled.</p>"
         )
-    else:
-        out = f"<p>No walls touch: the smallest distance is {min(d for *_, d in run.solve.walls):.2f} mm.</p>"
-    out += "".join(_image(folder, *p) for p in figures.wall_picture(run, folder))
+    if not distances:
+        return out + _missing("No wall distances: the body has no gaps.")
+    out += "".join(_image(folder, *p) for p in figures.touching_picture(run, folder) + figures.wall_picture(run, folder))
     rows = []
     for key in sorted({(a, b) for a, b, _, _ in run.solve.walls}, key=lambda k: (k[0], -k[1])):
         here = [(d, gap) for a, b, gap, d in run.solve.walls if (a, b) == key]
@@ -243,7 +258,7 @@ def _walls(run, folder):
                 plain(rest),
                 f"{distance:.3f}",
                 gap,
-                "OVERLAP" if distance < 0 else "open",
+                "open" if distance >= 0 else "in contact" if solve.contact else "OVERLAP",
             ]
         )
     return out + _table(["segment, side", "gaps", "gap at rest, mm", "smallest distance, mm", "in gap", ""], rows)
@@ -279,7 +294,7 @@ def _flat(record, prefix=""):
 def _computed(run):
     out = ""
     if run.solve is not None:
-        steps = run.solve.steps
+        solve, steps = run.solve, run.solve.steps
         rows = [
             ["accepted steps", int(steps["step"][-1])],
             ["Newton iterations", int(steps["iterations"].sum())],
@@ -287,6 +302,8 @@ def _computed(run):
             ["seconds in steps", f"{steps['seconds'][-1]:.1f}"],
             ["last pressure, kPa", plain(run.solve.pressure * 1e3)],
             ["reached the design pressure", "no" if stopped_short(run) else "yes"],
+            ["walls overlap", "yes" if solve.walls_overlap else "no"],
+            ["far parts of the body overlap", "yes" if solve.body_overlap else "no"],
         ]
         out += _table(["finite element solution", ""], rows)
     records = [

@@ -2,12 +2,20 @@
 
 import numpy as np
 
+from base import rendering
 from base.errors import ConvergenceError
+from base.rendering import figure, save
+from base.wall_picture import TOUCHING, draw_walls
 from design import bodies
 from design.drawing import chamber_plan
 from design.labels import FINITE_ELEMENTS, plain, segment_colour
-from design.pictures import curve_panels, figure, legend, save, segment_bands
+from design.pictures import curve_panels, legend, segment_bands
 from reduced.model import predict
+
+
+def _mark(run):
+    """What the titles of finite element pictures end with when parts overlap in them."""
+    return " (overlaps)" * bool(run.solve and (run.solve.walls_overlap or run.solve.body_overlap))
 
 
 def curve_picture(run, comparison, folder):
@@ -23,7 +31,8 @@ def curve_picture(run, comparison, folder):
         curves.append((f"reduced, {plain(pressure * 1e3)} kPa", reduced, "reduced"))
     bands = None
     if comparison.solved is not None:
-        curves.append((f"finite elements, {plain(pressure * 1e3)} kPa", comparison.solved, "finite elements"))
+        label = f"finite elements, {plain(pressure * 1e3)} kPa{_mark(run)}"
+        curves.append((label, comparison.solved, "finite elements"))
         s = np.linspace(run.solve.s[0], run.solve.s[-1], len(comparison.solved))
         bands = segment_bands(design.manipulator, s, comparison.solved)
     if not curves:
@@ -58,13 +67,13 @@ def body_pictures(run, comparison, model, folder):
     target = None if run.target is None else bodies.tube(run.target)
     curves = [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
     held = [m.points for m in (reduced, solved) if m is not None] + curves
-    view = bodies.view_of(np.vstack(held or [rest.points]))
+    view = rendering.view_of(np.vstack(held or [rest.points]))
     kPa = f"{plain(pressure * 1e3)} kPa"
     with_target = [target] if target else []
     out = []
 
     def picture(name, things, title, caption, bar=None):
-        bodies.write_picture(folder / name, view, bodies.render(view, things), title, bar)
+        rendering.write_picture(folder / name, view, rendering.render(view, things), title, bar)
         out.append((name, caption))
 
     if target:
@@ -86,7 +95,7 @@ def body_pictures(run, comparison, model, folder):
         picture(
             "fe.png",
             [(solved, plainly), solved_edges, *with_target],
-            f"finite elements, {kPa}",
+            f"finite elements, {kPa}{_mark(run)}",
             "The finite element body.",
         )
         for name, field, label, cmap in (
@@ -103,13 +112,13 @@ def body_pictures(run, comparison, model, folder):
                 beyond += f"; the largest inside the elements is {run.solve.steps['largest_stretch'][-1]:.2f}"
             picture(
                 name,
-                [bodies.coloured(solved, field, limits, cmap), solved_edges],
-                f"{label.split(' (')[0]}, {kPa}",
+                [rendering.coloured(solved, field, limits, cmap), solved_edges],
+                f"{label.split(' (')[0]}, {kPa}{_mark(run)}",
                 f"Finite element body coloured by {label.split(' (')[0]}{beyond}.",
                 (label, limits, cmap),
             )
-    rest_view = bodies.view_of(rest.points)
-    bodies.write_picture(folder / "reference.png", rest_view, bodies.render(rest_view, bodies.painted(rest)), "reference body, 0 kPa")
+    rest_view = rendering.view_of(rest.points)
+    rendering.write_picture(folder / "reference.png", rest_view, rendering.render(rest_view, bodies.painted(rest)), "reference body, 0 kPa")
     out.append(("reference.png", "The body at rest (its own scale)."))
     return out
 
@@ -149,6 +158,10 @@ def history_picture(run, model, folder):
         values = np.where(np.isfinite(steps[column]), steps[column], np.nan)  # no gaps, no distance: infinity
         ax.plot(p, values, "o-", color=FINITE_ELEMENTS, markersize=3, linewidth=1.4)
         ax.set_ylabel(label)
+    between = steps["body_distance_mm"]
+    if between.min() < 2 * max(s.gap for s in design.manipulator.segments):
+        axes[1, 0].plot(p, between, "s--", color="#862e9c", markersize=3, linewidth=1.2, label="parts far apart along the body")
+        axes[1, 0].legend(fontsize=7, frameon=False)
     low = axes[1, 0].get_ylim()[0]
     axes[1, 0].axhline(0.0, color="#c92a2a", linewidth=1.0)
     axes[1, 0].set_ylim(bottom=min(low, -0.05))
@@ -164,7 +177,29 @@ def history_picture(run, model, folder):
         (
             "history.png",
             "Load history of the finite element solution, one mark an accepted step; the reduced model's tip dashed; "
-            "dotted: design pressure; red: overlapping walls.",
+            "dotted: design pressure; red: below zero walls overlap.",
+        )
+    ]
+
+
+def touching_picture(run, folder):
+    """The deformed body, its facing walls coloured by their distance; [] without fields or gaps."""
+    if run.solve.solution is None:
+        return []
+    surface, (lines, _) = bodies.deformed_surface(bodies.read_solution(run.solve.solution), run.design.base_pose)
+    walls = bodies.facing_walls(surface)
+    if walls is None:
+        return []
+    gap = max(s.gap for s in run.design.manipulator.segments)
+    touching = TOUCHING * gap * run.solve.contact
+    around = f"is nearer than {touching:.2g} mm: contact" if touching else "lies behind the other: overlap"
+    title = f"distance of walls, {plain(run.solve.pressure * 1e3)} kPa{_mark(run)}"
+    draw_walls(folder / "fe_walls.png", surface, lines, walls, gap, title, touching)
+    return [
+        (
+            "fe_walls.png",
+            "Finite element body, last step; walls that face each other across a gap coloured by their distance. A black line surrounds "
+            f"where one {around}.",
         )
     ]
 
@@ -221,7 +256,7 @@ def wall_picture(run, folder):
                             linewidth=0.7,
                         )
                     )
-                    if distance < 0:
+                    if distance < 0 and not run.solve.contact:
                         ax.plot(x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False)
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)

@@ -22,6 +22,9 @@ STEP_COLUMNS = [
     "tip_y_mm",
     "tip_z_mm",
     "smallest_wall_distance_mm",
+    "walls_overlap",
+    "body_distance_mm",
+    "body_overlap",
     "largest_stretch",
     "seconds",
 ]
@@ -35,6 +38,9 @@ class Solve:
     points (m, 3): its centreline; strains: RodStrains of shape (segments, 3) at that step; walls: [(segment 1..,
     side +1/-1, gap 1.., distance)] of the gaps that have walls; history: [(pressure in MPa, s,
     points)] of all steps; solution: the ParaView file, or None; record: run.json.
+
+    From the first touch of walls without contact, or of parts that are far apart along the body, the steps are marked
+    (columns walls_overlap, body_overlap): they are not what a real body does.
     """
 
     steps: dict
@@ -46,6 +52,19 @@ class Solve:
     walls: list
     solution: Path | None
     record: dict
+
+    @property
+    def walls_overlap(self):
+        return bool(self.steps["walls_overlap"][-1])
+
+    @property
+    def body_overlap(self):
+        return bool(self.steps["body_overlap"][-1])
+
+    @property
+    def contact(self):
+        """Whether a contact model kept neighbouring walls apart."""
+        return bool(self.record.get("contact", False))
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,8 @@ def _list(pressures):
 
 
 def _pictures(design, shapes, model, folder, say):
-    from design.bodies import body_mesh, view_of
+    from base.rendering import view_of
+    from design.bodies import body_mesh
 
     bodies = {p: body_mesh(design.manipulator, p, model, design.base_pose) for p in shapes}
     for p, body in bodies.items():
@@ -85,8 +86,8 @@ def _pictures(design, shapes, model, folder, say):
 
 def _picture_of_all(design, view, bodies, path):
     """One panel a pressure, same camera and scale."""
-    from design.bodies import painted, render, show
-    from design.pictures import figure, save
+    from base.rendering import figure, render, save, show
+    from design.bodies import painted
 
     columns = min(len(bodies), 3)
     rows = -(-len(bodies) // columns)
@@ -116,7 +117,8 @@ def _animation(design, highest, model, path):
     """A GIF that inflates to `highest` (MPa) and holds; 24 frames of a few kB each."""
     from PIL import Image, ImageDraw
 
-    from design.bodies import body_mesh, painted, render, view_of
+    from base.rendering import render, view_of
+    from design.bodies import body_mesh, painted
 
     pressures = highest * np.linspace(0, 1, FRAMES)
     bodies = [body_mesh(design.manipulator, p, model, design.base_pose) for p in pressures]

@@ -68,7 +68,7 @@ class BodySystem:
         self.solver.factorise()
         self._rotation_then = self._rotations()
         contact = self.problem.contact
-        self._update = ContactUpdate(contact.stiffnesses() if contact else {}, MOST_TOUCHES, self.comm.allreduce)
+        self._update = ContactUpdate(contact.stiffnesses(factorised=True) if contact else {}, MOST_TOUCHES, self.comm.allreduce)
 
     @property
     def overreach(self):

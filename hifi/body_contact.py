@@ -76,9 +76,10 @@ class BodyContact:
         matrix.axpy(1.0, contact, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         contact.destroy()
 
-    def stiffnesses(self):
-        """{point: N/mm} at the last residual, of all ranks."""
-        own = {point: value for side in self._now for point, value in side.touching.stiffnesses(side.number).items()}
+    def stiffnesses(self, factorised=False):
+        """{point: N/mm} at the last residual, or the last tangent, of all ranks."""
+        sides = self._then if factorised else self._now
+        own = {point: value for side in sides for point, value in side.touching.stiffnesses(side.number).items()}
         return {point: value for part in self.comm.allgather(own) for point, value in part.items()}
 
     def gradients(self, points):
@@ -93,13 +94,12 @@ class BodyContact:
         own = sp.vstack([parts.get(i, empty) for i in range(len(points))]).tocsr()
         return sum(self.comm.allgather(own))[:, self._owned].toarray()
 
-    def measure(self, pressure):
-        """[(force (3,) in N, area in mm2) of each gap] on all ranks; the force of the first wall on the second."""
-        rows = np.zeros((len(self._laws), 4))
-        for side in self._touching():
-            t, gap = side.touching, side.number // 2
-            rows[gap, :3] += (-1) ** side.number * (t.area * t.pressure) @ t.normal
-            rows[gap, 3] += t.area[t.pressure > 0.1 * pressure].sum()
+    def forces(self):
+        """(gaps, 3) N at the last residual, on all ranks: of each gap's first wall on the second."""
+        rows = np.zeros((len(self._laws), 3))
+        for side in self._now:
+            t = side.touching
+            rows[side.number // 2] += (-1) ** side.number * (t.area * t.pressure) @ t.normal
         return self.comm.allreduce(rows)
 
 

@@ -81,9 +81,10 @@ class CellContact:
         total = total.tocoo()
         return (total.row, total.col, total.data), mixed, curvature
 
-    def stiffnesses(self):
-        """{point: N/mm} at the last residual."""
-        return {point: value for side in self._now for point, value in side.touching.stiffnesses(side.number).items()}
+    def stiffnesses(self, factorised=False):
+        """{point: N/mm} at the last residual, or the last tangent."""
+        sides = self._then if factorised else self._now
+        return {point: value for side in sides for point, value in side.touching.stiffnesses(side.number).items()}
 
     def gradients(self, points):
         """(m, unknowns + 6): how the gaps of points that push, or did so at the last tangent, change with unknowns and strains."""

@@ -156,7 +156,7 @@ class CellSystem:
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
         self._influence = self._solver.solve_many(self._mixed)
         self._condensed = self._curvature - self._mixed.T @ self._influence
-        self._update = ContactUpdate(self.problem.contact.stiffnesses() if self.problem.contact else {})
+        self._update = ContactUpdate(self.problem.contact.stiffnesses(factorised=True) if self.problem.contact else {})
 
     def renew(self):
         """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""

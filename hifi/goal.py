@@ -68,15 +68,14 @@ class Goal:
         return "dead loads alone" if self.is_last(DEAD_LOADS) else f"dead loads, then {inflation}" if self.dead else inflation
 
     def done(self, m, stage, parameter):
-        """The last line's beginning, of the last state."""
+        """The last line's beginning, of the last state, and what makes it doubtful."""
         pressure = f" at {m.pressure * KPA:.4g} kPa" * (stage in ("volume", "arc length"))
-        return f"done: {self.where(stage, parameter)}{pressure}"
+        return f"done: {self.where(stage, parameter)}{pressure}" + f"; {m.touch.text}" * bool(m.touch.text)
 
     def progress(self, m, stage, done, breaks_at):
         """The line of an accepted state (hifi.manipulator.Measured), `done` of the whole stage."""
         eta = m.seconds / done * (1 - done)
-        nearest = m.walls.min() if len(m.walls) else float("inf")
-        warning = "  WALLS OVERLAP" if nearest < 0 else ""
+        warning = "".join(f"  {word.upper()}" for word in m.touch.warnings)
         if m.unstable:
             warning += f"  UNSTABLE in {m.unstable}"
         if m.largest_stretch > breaks_at:
@@ -85,11 +84,12 @@ class Goal:
         place += f"  {m.volume:9.1f} mm3" * (self.control != "pressure")
         return (
             f"step {m.step:3d}  {place}  {m.iterations:2d} iterations  {m.factorisations} factorisations  "
-            f"stretch {m.largest_stretch:.2f}  wall distance {nearest:.2f} mm  {m.seconds:6.1f} s  ETA {eta:5.0f} s{warning}"
+            f"stretch {m.largest_stretch:.2f}  wall distance {m.touch.wall_distance:.2f} mm  {m.seconds:6.1f} s  ETA {eta:5.0f} s{warning}"
         )
 
-    def failure(self, stage, parameter, result, out):
-        """Why the run ended short of its goal, where its data are, and what to try; `result`: hifi.stepping.StepResult."""
+    def failure(self, m, stage, parameter, result, out):
+        """Why the run ended short of its goal, where its data are, and what to try; m: its last state, `result`:
+        hifi.stepping.StepResult."""
         if stage == DEAD_LOADS:
             why, remedy = "buckling or too coarse a mesh", "smaller [loads] or a smaller mesh_size_mm"
         else:
@@ -97,7 +97,8 @@ class Goal:
         if result.diagnosis and stage == "pressure":
             remedy = f'control = "volume" in the design, which walks through limit points, or {remedy}'
         what = "[loads] were" if stage == DEAD_LOADS else f"{self.key} = {self.value:g} was"
+        overlap = f" ({m.touch.text})" * bool(m.touch.text)
         return (
             f"{what} not reached: stopped at {self.where(stage, parameter)} ({result.reason}), "
-            f"{result.diagnosis or f'usually by {why}'}; the result up to there is in {out}; try {remedy}"
+            f"{result.diagnosis or f'usually by {why}'}; the result up to there is in {out}{overlap}; try {remedy}"
         )

@@ -11,6 +11,7 @@ from geometry.loading import DeadLoads
 from hifi import compat
 from hifi.body import BodySystem
 from hifi.body_contact import BodyContact
+from hifi.body_distance import BodyDistance
 from hifi.control import ArcLength, LoadControl, VolumeControl
 from hifi.loads import EndLoad, Gravity, Pressure
 from hifi.path import EquilibriumPath
@@ -19,6 +20,7 @@ from hifi.rod_coordinates import RodCoordinates
 from hifi.sections import SectionFrames
 from hifi.stepping import StepResult, StepSize, run_steps
 from hifi.stretch import PrincipalStretch
+from hifi.touch import Load, Touch, TouchWatch
 from hifi.walls import WallDistances
 
 #: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how far they strain
@@ -29,7 +31,8 @@ DEAD_LOADS = "dead loads"
 
 @dataclass(frozen=True)
 class Measured:
-    """One accepted state, the same on all ranks but for `walls` (rank 0 only). Pressure in MPa, lengths in mm.
+    """One accepted state, the same on all ranks but for `walls`, the smallest distance in each gap (rank 0 only). Pressure in MPa,
+    lengths in mm. touch: whether parts of the body run into each other.
 
     dead_loads: the fraction of them that acts. unstable: unstable directions at fixed loads of the tangent factorised last: at
     this very state if stability_factorisations is 1, in this step or before otherwise. limit_points: hifi.path.LimitPoints of
@@ -47,6 +50,7 @@ class Measured:
     frames: np.ndarray
     strains: object
     walls: np.ndarray | None
+    touch: Touch
     unstable: int
     dead_loads: float
     stability_factorisations: int
@@ -77,10 +81,13 @@ class ManipulatorSolve:
         self.system = BodySystem(self.problem, coordinates, self._set_pressure)
         self.sections = SectionFrames(self.problem, manipulator)
         self.walls = WallDistances(self.problem, manipulator)
+        self.body_distance = BodyDistance(self.problem, manipulator)
         if contact:
             owners = [manipulator.segments[number - 1] for number, _, _, _ in self.walls.gaps]
             laws = [contact.on(s.material.mu, s.gap) for s in owners]
             self.problem.contact = BodyContact(self.problem, self.walls, laws, [s.gap for s in owners]) if laws else None
+        #: what the accepted states have met
+        self.watch = TouchWatch(self.problem.contact is not None)
         self.stretch = PrincipalStretch(self.problem)
         #: hifi.stepping.Step of the last accepted state
         self.last_step = None
@@ -111,7 +118,7 @@ class ManipulatorSolve:
 
     def measure(self, step=None, stability_factorisations=0):
         """Measured of the current state; collective."""
-        frames = self.sections.frames()
+        frames, walls = self.sections.frames(), self.walls.distances()
         return Measured(
             step=step.number if step else 0,
             pressure=float(self.pressure.value.value),
@@ -123,12 +130,25 @@ class ManipulatorSolve:
             stations=self.sections.stations,
             frames=frames,
             strains=self.sections.segment_strains(frames),
-            walls=self.walls.distances(),
+            walls=walls,
+            touch=self._touch(walls),
             unstable=self.system.unstable,
-            dead_loads=float(self.dead[0].value.value) if self.dead else 0.0,
+            dead_loads=self._dead_fraction,
             stability_factorisations=stability_factorisations,
             limit_points=tuple(self.path.limit_points),
         )
+
+    def _touch(self, walls):
+        """The Touch of the current state, the same on all ranks; `walls` on rank 0."""
+        body, contact = self.body_distance.smallest(), self.problem.contact
+        nearest = (float(walls.min(initial=np.inf)), body) if self.comm.rank == 0 else None
+        force = np.linalg.norm(contact.forces(), axis=1).max() if contact else 0.0
+        load = Load(float(self.pressure.value.value), self._dead_fraction)
+        return self.watch.see(load, *self.comm.bcast(nearest, root=0), float(force))
+
+    @property
+    def _dead_fraction(self):
+        return float(self.dead[0].value.value) if self.dead else 0.0
 
     def run(
         self,

@@ -20,6 +20,8 @@ from hifi.manipulator import ManipulatorSolve
 from hifi.output import FieldWriter
 from hifi.results import KPA, ResultFiles, limit_table, limit_text
 from hifi.stepping import StepResult
+from hifi.touch import Touch
+from hifi.wall_contact import WallPenalty
 
 
 def solve_design(
@@ -52,13 +54,15 @@ def solve_design(
         "loads": design.loads.table(),
         "base": design.base_pose.tolist() if design.loads else None,
         "control": goal.control,
+        "contact": design.contact,
     }
     facts, kept = on_rank_0(comm, lambda: _prepare(design, directory, mesh_size, identity, resume, say))
     mesh_path, loads = directory / "mesh" / "manipulator.msh", design.loads.in_body(design.base_pose)
-    solve = ManipulatorSolve(design.manipulator, mesh_path, comm, loads=loads)
+    penalty = WallPenalty() if design.contact == "auto" else None
+    solve = ManipulatorSolve(design.manipulator, mesh_path, comm, loads=loads, contact=penalty)
     target = goal.target(solve.rest_volume)
     files = ResultFiles(out, solve.walls.gaps)
-    writer = FieldWriter(out, solve.problem, solve.stretch) if fields else None
+    writer = FieldWriter(out, solve.problem, solve.stretch, solve.walls) if fields else None
     say(
         f"solve: {facts['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size} rank{'s' * (comm.size > 1)}, "
         f"{goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
@@ -68,11 +72,13 @@ def solve_design(
     if kept:
         solve.begin(str(kept["stage"]))
         before = solve.last_step = checkpoint.restore(kept, solve.path)
+        history, watched = _written(comm, out, lambda: (files.keep(before.number), files.history(), files.watched())[1:])
+        for state in watched:
+            solve.watch.see(*state)
         last[:] = [solve.measure(before)]
         if goal.is_last(solve.stage) and before.load > goal.end(solve.stage, target) * (1 + 1e-12):
             raise InputError(f"{out / checkpoint.NAME}: has passed {goal.key} = {goal.value:g} already: solve without --resume")
         say(f"resumed after step {before.number} at {goal.where(solve.stage, before.load)}")
-        history = _written(comm, out, lambda: (files.keep(before.number), files.history())[1])
         if writer:
             _written(comm, out, lambda: writer.keep([(row["step"], goal.time(row["step"], row["pressure_kPa"])) for row in history]))
 
@@ -85,6 +91,7 @@ def solve_design(
                 **goal.table,
                 loads=identity["loads"],
                 limit_points=[limit_table(p) for p in last[0].limit_points],
+                **last[0].touch.table(),
                 **extras,
                 body=identity["body"],
                 mesh=facts,
@@ -111,18 +118,19 @@ def solve_design(
             raise _unwritable(out, error) from None
 
     def write(m):
-        news = m.limit_points[len(last[0].limit_points) :] if last else ()
+        news = [limit_text(p) for p in (m.limit_points[len(last[0].limit_points) :] if last else ())]
+        news += m.touch.news(last[0].touch if last else Touch())
         last[:] = [m]
         if writer:
-            writer.write(m.step, goal.time(m.step, m.pressure * KPA))
+            writer.write(m.step, goal.time(m.step, m.pressure * KPA), m.touch.marks)
         on_rank_0(comm, lambda: (files.add(m), history.append(files.history()[-1]), record("running, or ended by force")) and None)
         if m.step:  # last: what a checkpoint refers to is on disk
             checkpoint.save(out, solve.path, solve.last_step, solve.stage, identity)
             if comm.rank == 0:
                 start = solve.rest_volume if solve.stage == "volume" else 0.0
                 say(goal.progress(m, solve.stage, (solve.path.parameter - start) / (goal.end(solve.stage, target) - start), breaks_at))
-            for point in news:
-                say(limit_text(point))
+        for text in news:
+            say(text)
         on_measured(m)
 
     complete = before and goal.is_last(solve.stage) and before.load >= (1 - 1e-12) * goal.end(solve.stage, target)
@@ -151,10 +159,10 @@ def solve_design(
     _written(comm, out, lambda: record(status, result.failures))
     solve.destroy()
     if failure:
-        raise ConvergenceError(goal.failure(solve.stage, solve.path.parameter, result, out))
+        raise ConvergenceError(goal.failure(last[0], solve.stage, solve.path.parameter, result, out))
     if "blocked_force" in missing:
         say("blocked force: the same body with its tip held")
-        extras["blocked_force"] = tip.blocked_force(design.manipulator, mesh_path, last[0].pressure, loads, comm)
+        extras["blocked_force"] = tip.blocked_force(design.manipulator, mesh_path, last[0].pressure, loads, comm, penalty)
         _written(comm, out, lambda: record(status, result.failures))
     ending = goal.done(last[0], solve.stage, solve.path.parameter)
     say("; ".join([ending, *map(limit_text, last[0].limit_points), f"results in {out}"]))

@@ -17,11 +17,13 @@ TO_VTK = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
 class FieldWriter:
     """Gathers fields on rank 0 and writes them with VTK, so that files are the same for any number of ranks.
 
-    Each .vtu appears by rename when it is whole, and only then in solution.pvd: a killed run leaves valid files.
+    At points: displacement (mm), pressure (the multiplier, MPa), stretch (largest principal) and wall_distance_mm, on facing walls
+    the signed distance from the wall opposite and nan elsewhere; as field data the marks of hifi.touch. Each .vtu appears by
+    rename when it is whole, and only then in solution.pvd: a killed run leaves valid files.
     """
 
-    def __init__(self, directory, problem, stretch):
-        self.directory, self.problem, self.stretch = Path(directory), problem, stretch
+    def __init__(self, directory, problem, stretch, walls):
+        self.directory, self.problem, self.stretch, self.walls = Path(directory), problem, stretch, walls
         self.comm = problem.mesh.comm
         index_map = problem.displacement_space.dofmap.index_map
         self._owned = index_map.size_local
@@ -29,6 +31,7 @@ class FieldWriter:
         local_to_global = index_map.local_to_global(np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32))
         self._cells = self._gather(local_to_global[cells])
         self._points = self._gather(problem.nodes[: self._owned])
+        self._wall_nodes = walls.node_numbers(local_to_global)
         self._listed = []
 
     def keep(self, steps):
@@ -55,17 +58,26 @@ class FieldWriter:
             out[p2[:, 4 + i]] = (corner[p1[:, a]] + corner[p1[:, b]]) / 2
         return out
 
-    def write(self, number, pressure_kPa):
-        """Write the current state as step `number` at the given pressure."""
+    def _wall_distance(self):
+        """wall_distance_mm of all nodes on rank 0, None elsewhere."""
+        distances = self.walls.at_nodes()
+        if distances is None:
+            return None
+        out = np.full(len(self._points), np.nan)
+        np.fmin.at(out, self._wall_nodes.ravel(), np.where(np.isfinite(distances), distances, np.nan).ravel())
+        return out
+
+    def write(self, number, pressure_kPa, marks):
+        """Write the current state as step `number` at the given pressure; `marks`: {name: bool} for the file's field data."""
         fields = {
             "displacement": self.problem.displacement()[: self._owned],
             "pressure": self._pressure_at_nodes()[: self._owned],
             "stretch": self.stretch.nodal()[: self._owned],
         }
-        fields = {name: self._gather(values) for name, values in fields.items()}
-        on_rank_0(self.comm, lambda: self._save(fields, number, pressure_kPa))
+        fields = {name: self._gather(values) for name, values in fields.items()} | {"wall_distance_mm": self._wall_distance()}
+        on_rank_0(self.comm, lambda: self._save(fields, marks, number, pressure_kPa))
 
-    def _save(self, fields, number, pressure_kPa):
+    def _save(self, fields, marks, number, pressure_kPa):
         import pyvista
         from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
@@ -73,6 +85,8 @@ class FieldWriter:
         grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), QUADRATIC_TETRA, np.uint8), self._points)
         for name, values in fields.items():
             grid.point_data[name] = values.astype(np.float32)
+        for name, value in marks.items():
+            grid.field_data[name] = np.array([value], np.int32)
         name = f"step_{number:04d}.vtu"
         writer = vtkXMLUnstructuredGridWriter()
         writer.SetInputData(grid)

@@ -2,9 +2,20 @@
 
 from pathlib import Path
 
+from base.errors import InputError
 from base.files import read_csv, write_csv
+from hifi.touch import KPA, MARKS, Load
 
-KPA = 1e3  # kPa per MPa
+STEPS = [
+    *"step pressure_kPa iterations factorisations volume_mm3 tip_x_mm tip_y_mm tip_z_mm".split(),
+    *["smallest_wall_distance_mm", MARKS[0], "body_distance_mm", MARKS[1], "contact_force_N"],
+    *"largest_stretch unstable_directions dead_load_fraction stability_factorisations seconds".split(),
+]
+TABLES = {
+    "steps": STEPS,
+    "centrelines": [*"step pressure_kPa s_mm x_mm y_mm z_mm".split(), *MARKS],
+    "segments": [*"step pressure_kPa segment e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(), *MARKS],
+}
 
 
 class ResultFiles:
@@ -15,10 +26,18 @@ class ResultFiles:
         self.steps, self.centrelines, self.segments = [], [], []
 
     def keep(self, last):
-        """Go on from an earlier run's files: its rows up to step `last`."""
-        for name in ("steps", "centrelines", "segments"):
-            rows = read_csv(self.directory / f"{name}.csv")[1]
+        """Go on from an earlier run's files: its rows up to step `last`. InputError when they are of another version's making."""
+        for name, columns in TABLES.items():
+            header, rows = read_csv(self.directory / f"{name}.csv")
+            if header != columns:
+                raise InputError(f"{self.directory / name}.csv: has not the columns of this version: solve without --resume")
             setattr(self, name, [row for row in rows if int(row[0]) <= last])
+
+    def watched(self):
+        """(Load, wall distance, body distance, contact force) of the steps kept, for a hifi.touch.TouchWatch."""
+        columns = "pressure_kPa dead_load_fraction smallest_wall_distance_mm body_distance_mm contact_force_N".split()
+        rows = [[float(row[STEPS.index(name)]) for name in columns] for row in self.steps]
+        return [(Load(p / KPA, dead), *seen) for p, dead, *seen in rows]
 
     def history(self):
         """run.json's list of the steps kept."""
@@ -28,33 +47,24 @@ class ResultFiles:
                 "pressure_kPa": float(row[1]),
                 "iterations": int(row[2]),
                 "factorisations": int(row[3]),
-                "stability_factorisations": int(row[-2]),
+                "stability_factorisations": int(row[STEPS.index("stability_factorisations")]),
+                **{name: bool(int(row[STEPS.index(name)])) for name in MARKS},
             }
             for row in self.steps
         ]
 
     def add(self, m):
         p = m.pressure * KPA
-        nearest = float(m.walls.min()) if len(m.walls) else float("inf")
-        tip = m.frames[-1, :3, 3]
-        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip, nearest, m.largest_stretch, m.unstable]
-        row += [m.dead_loads, m.stability_factorisations, m.seconds]
+        tip, touch, marks = m.frames[-1, :3, 3], m.touch, [int(holds) for holds in m.touch.marks.values()]
+        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip]
+        row += [touch.wall_distance, marks[0], touch.body_distance, marks[1], touch.contact_force]
+        row += [m.largest_stretch, m.unstable, m.dead_loads, m.stability_factorisations, m.seconds]
         self.steps.append(row)
-        self.centrelines += [[m.step, p, s, *g[:3, 3]] for s, g in zip(m.stations, m.frames)]
+        self.centrelines += [[m.step, p, s, *g[:3, 3], *marks] for s, g in zip(m.stations, m.frames)]
         for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
-            self.segments.append([m.step, p, i, *e, *k])
-        write_csv(
-            self.directory / "steps.csv",
-            "step pressure_kPa iterations factorisations volume_mm3 tip_x_mm tip_y_mm tip_z_mm smallest_wall_distance_mm "
-            "largest_stretch unstable_directions dead_load_fraction stability_factorisations seconds".split(),
-            self.steps,
-        )
-        write_csv(self.directory / "centrelines.csv", "step pressure_kPa s_mm x_mm y_mm z_mm".split(), self.centrelines)
-        write_csv(
-            self.directory / "segments.csv",
-            "step pressure_kPa segment e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(),
-            self.segments,
-        )
+            self.segments.append([m.step, p, i, *e, *k, *marks])
+        for name, columns in TABLES.items():
+            write_csv(self.directory / f"{name}.csv", columns, getattr(self, name))
         write_csv(
             self.directory / "walls.csv",
             "segment side gap gap_mm distance_mm".split(),

@@ -13,6 +13,7 @@ from hifi.agreement import on_rank_0
 from hifi.case_process import REFUSED
 from hifi.cases import run_cases
 from hifi.studyfile import read_study, value_of
+from hifi.touch import MARKS
 
 #: a case's rows, written by hifi.study_cases
 LEVELS = "levels.csv"
@@ -52,10 +53,19 @@ def _finish(study, table, records, directory, ranks, seconds, say):
     counts = Counter(record["status"] for record in records)
     counts[REFUSED] += sum(case.case is None for case in study.cases)
     counts = {status: number for status, number in counts.items() if number}
+    overlapping = table.overlapping()
     picture = draw(study, table, directory / "study.png")
-    write_record(directory, kind=study.kind, variables=study.variables, cases=counts, ranks=ranks, wall_seconds=seconds)
+    facts = {"variables": study.variables, "cases": counts, "overlapping_cases": overlapping}
+    write_record(directory, kind=study.kind, **facts, ranks=ranks, wall_seconds=seconds)
     summary = ", ".join(f"{number} {status}" for status, number in counts.items())
+    if overlapping:
+        summary += f"; {overlapping} OVERLAP, without a contact model, at their higher pressures (columns {', '.join(MARKS)})"
     say(f"{summary}; table in {directory / 'study.csv'}" + (f", picture {directory / 'study.png'}" if picture else ""))
+
+
+def overlaps(level):
+    """Whether a level (a row of levels.csv) is marked as one in which parts of the body overlap."""
+    return any(level.get(mark) == "1" for mark in MARKS)
 
 
 class StudyTable:
@@ -77,6 +87,11 @@ class StudyTable:
         if study_case.case is None:
             return {"status": REFUSED, "reason": study_case.refusal, "seconds": "", "peak_memory_MB": ""}, []
         return self._known.get(study_case.case.name)
+
+    def overlapping(self):
+        """Number of the study's cases in which something overlaps at some level."""
+        known = [self.of(case) for case in self.study.cases]
+        return sum(any(overlaps(level) for level in levels) for _, levels in filter(None, known))
 
     def write(self):
         study = self.study

@@ -17,6 +17,7 @@ from hifi.cellfile import cell_from_tables
 from hifi.manipulator_run import break_stretch, solve_design
 from hifi.results import KPA
 from hifi.study import LEVELS
+from hifi.touch import MARKS
 
 STRAINS = "e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm k_norm_per_mm k_dot_e_per_mm".split()
 EFFORT = ["steps", "factorisations", "seconds"]
@@ -26,7 +27,7 @@ def solve_cell_case(inputs, directory):
     """One cell: `inputs` are the tables of a CELL.toml. Returns the facts of its mesh."""
     case = cell_from_tables(inputs, "the case")
     write_text(directory / "cell.toml", toml_text(inputs))
-    breaks_at, rows = break_stretch(Manipulator((case.segment,))), []
+    breaks_at, rows, touched = break_stretch(Manipulator((case.segment,))), [], []
 
     def keep(state):
         rows.append(
@@ -34,14 +35,15 @@ def solve_cell_case(inputs, directory):
                 "pressure_kPa": state.pressure * KPA,
                 **_strains(state.strains.e, state.strains.k),
                 "smallest_wall_distance_mm": state.wall_distance,
+                "first_touch_kPa": touched[0] * KPA if touched else "",
                 "contact_force_N": state.contact.force if state.contact else 0.0,
-                **_body(state, breaks_at, state.wall_distance if state.contact is None else np.inf),
+                **_body(state, breaks_at, {MARKS[0]: state.walls_overlap}),
                 **{name: getattr(state, name) for name in EFFORT},
             }
         )
         _write(directory, rows)
 
-    return {"mesh": solve_cell(case, directory / "cell.msh", keep)[1]}
+    return {"mesh": solve_cell(case, directory / "cell.msh", keep, on_touch=touched.append)[1]}
 
 
 def solve_design_case(inputs, directory):
@@ -60,14 +62,16 @@ def solve_design_case(inputs, directory):
         for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
             prefix = f"segment{i}_" if len(m.strains.e) > 1 else ""
             strains |= {prefix + name: value for name, value in _strains(e, k).items()}
-        nearest = float(m.walls.min()) if len(m.walls) else np.inf
         # by pressure: under further loads the last state there counts
         rows[m.pressure] = {
             "pressure_kPa": m.pressure * KPA,
             **strains,
             **{f"tip_{axis}_mm": value for axis, value in zip("xyz", m.frames[-1, :3, 3])},
-            "smallest_wall_distance_mm": nearest if np.isfinite(nearest) else "",
-            **_body(m, breaks_at, nearest),
+            "smallest_wall_distance_mm": _finite(m.touch.wall_distance),
+            "contact_force_N": m.touch.contact_force,
+            "first_touch_kPa": m.touch.walls_from.pressure * KPA if m.touch.walls_from else "",
+            "body_distance_mm": _finite(m.touch.body_distance),
+            **_body(m, breaks_at, m.touch.marks),
             **{"steps": m.step, "factorisations": sum(factorisations), "seconds": m.seconds},
         }
         _write(directory, rows.values())
@@ -80,10 +84,14 @@ def _strains(e, k):
     return dict(zip(STRAINS, [*e, *k, np.linalg.norm(k), k @ e]))
 
 
-def _body(state, breaks_at, nearest):
-    """What cells and manipulators tell alike, and a word on what makes the row doubtful."""
+def _finite(distance):
+    return distance if np.isfinite(distance) else ""
+
+
+def _body(state, breaks_at, marks):
+    """What cells and manipulators tell alike, and a word on what makes the row doubtful; marks: {column of hifi.touch.MARKS: bool}."""
     warnings = {
-        "walls overlap": nearest < 0,
+        **{name.replace("_", " "): holds for name, holds in marks.items()},
         "stretched beyond break": state.largest_stretch > breaks_at,
         "unstable": state.unstable,
     }
@@ -91,6 +99,7 @@ def _body(state, breaks_at, nearest):
         "volume_mm3": state.volume,
         "largest_stretch": state.largest_stretch,
         "unstable_directions": state.unstable,
+        **{name: int(holds) for name, holds in marks.items()},
         "warnings": ", ".join(word for word, holds in warnings.items() if holds),
     }
 

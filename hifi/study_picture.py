@@ -4,6 +4,7 @@ import numpy as np
 
 from base.files import atomic_path
 from hifi.case_process import DONE
+from hifi.study import overlaps
 from hifi.studyfile import value_of
 
 PANELS = (
@@ -15,6 +16,8 @@ PER_M = 1e3
 #: more values than this are told by a colour bar instead of a legend
 LEGEND_LIMIT = 12
 STYLES = ("-", "--", ":", "-.")
+#: levels that are marked
+OVERLAP = {"linestyle": "", "marker": "o", "markersize": 7, "markerfacecolor": "none", "markeredgecolor": "#c92a2a"}
 MARKERS = ("", "o", "s", "^")
 
 
@@ -28,12 +31,16 @@ def draw(study, table, path):
     prefixes = [name[: -len(PANELS[0][0])] for name in cases[0][2][0] if name.endswith(PANELS[0][0])]
     figure = Figure(figsize=(13, 0.8 + 3.9 * len(prefixes)), facecolor="white", layout="constrained")
     axes = figure.subplots(len(prefixes), len(PANELS), squeeze=False, sharex=True)
+    some_overlap = False
     looks = _Looks(study, [case for case, _, _ in cases])
     for row, prefix in zip(axes, prefixes):
         for ax, (column, label) in zip(row, PANELS):
             for case, record, levels in cases:
                 x, y = (np.array([float(level[name]) for level in levels]) for name in ("pressure_kPa", prefix + column))
                 ax.plot(x, PER_M * y, **looks.of(case))
+                overlapping = [overlaps(level) for level in levels]
+                ax.plot(x[overlapping], PER_M * y[overlapping], **OVERLAP)
+                some_overlap |= any(overlapping)
                 if record["status"] != DONE:
                     ax.plot(x[-1:], PER_M * y[-1:], "x", color="black", markersize=8, zorder=3)
             ax.set_xlabel("pressure (kPa)")
@@ -41,7 +48,7 @@ def draw(study, table, path):
             ax.set_title(prefix.strip("_"), fontsize=10)
             ax.axhline(0, color="0.8", linewidth=0.8, zorder=0)
             ax.spines[["top", "right"]].set_visible(False)
-    looks.explain(figure, axes, any(record["status"] != DONE for _, record, _ in cases))
+    looks.explain(figure, axes, any(record["status"] != DONE for _, record, _ in cases), some_overlap)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=120)
     return True
@@ -74,7 +81,7 @@ class _Looks:
         number = self.combinations.index(self._combination(case))
         return {"color": self._colour(value_of(self.variable, case)), **self._line(number)}
 
-    def explain(self, figure, axes, some_stopped):
+    def explain(self, figure, axes, some_stopped, some_overlap):
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import LinearSegmentedColormap, Normalize
         from matplotlib.lines import Line2D
@@ -94,6 +101,8 @@ class _Looks:
                 handles.append(Line2D([], [], color="0.3", label=label, **self._line(number)))
         if some_stopped:
             handles.append(Line2D([], [], color="black", marker="x", linestyle="", label="ended before its top pressure"))
+        if some_overlap:
+            handles.append(Line2D([], [], label="overlap (no contact model)", **OVERLAP))
         figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9)
 
 

@@ -45,6 +45,7 @@ def stiffness(solve):
     K = np.linalg.inv(compliance(solve.system, cad.TIP, frame))
     return {
         "pressure_kPa": float(solve.pressure.value.value) * 1e3,
+        **solve.measure().touch.marks,
         "rows": "force_N, moment_N_mm; columns: displacement_mm, rotation_rad; in axes and about origin of the tip's section frame",
         "frame_origin_mm": frame[:3, 3].tolist(),
         "frame_axes": frame[:3, :3].T.tolist(),
@@ -52,13 +53,13 @@ def stiffness(solve):
     }
 
 
-def blocked_force(manipulator, mesh_path, pressure, loads, comm):
+def blocked_force(manipulator, mesh_path, pressure, loads, comm, contact=None):
     """run.json's `blocked_force`: what the tip, held where it is at rest, pushes with at `pressure` (MPa); collective.
 
     Gravity acts from the start, tip loads do not: they would go straight into what holds the tip. Force and moment about the
     tip frame's origin at rest, body axes. Where the held body cannot be inflated so far, the last pressure reached counts.
     """
-    held = ManipulatorSolve(manipulator, mesh_path, comm, loads=DeadLoads(gravity=loads.gravity), hold_tip=True)
+    held = ManipulatorSolve(manipulator, mesh_path, comm, loads=DeadLoads(gravity=loads.gravity), hold_tip=True, contact=contact)
     try:
         if pressure or held.dead:
             held.run(pressure)
@@ -71,6 +72,7 @@ def blocked_force(manipulator, mesh_path, pressure, loads, comm):
     return {
         "pressure_kPa": measured.pressure * 1e3,
         "reached": reached,
+        **measured.touch.marks,
         "force_N": (-force).tolist(),
         "moment_N_mm": (-moment).tolist(),
         "unstable_directions": measured.unstable,

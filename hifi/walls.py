@@ -73,17 +73,31 @@ class WallDistances:
 
     def distances(self, array=None):
         """(gaps,) signed smallest distances in mm, on rank 0 (None elsewhere); inf where a gap has no walls."""
+        each = self.at_nodes(array)
+        if each is None:
+            return None
+        out = np.full(2 * len(self.gaps), np.inf)
+        np.fmin.at(out, self._wall, each.min(axis=1, initial=np.inf))
+        return out.reshape(-1, 2).min(axis=1)
+
+    def at_nodes(self, array=None):
+        """(facets of all walls, 6) signed distances (mm) of their nodes from the wall that they face, on rank 0 (None elsewhere)."""
         positions = self._gather(self.problem.nodes + self.problem.displacement(array))
         if self.comm.rank != 0:
             return None
-        out = np.full(len(self.gaps), np.inf)
+        out = np.full(positions.shape[:2], np.inf)
         order = np.argsort(self._wall, kind="stable")
-        bounds = np.searchsorted(self._wall[order], np.arange(2 * len(self.gaps) + 1))
-        for g in range(len(self.gaps)):
-            a, b = (positions[order[bounds[w] : bounds[w + 1]]] for w in (2 * g, 2 * g + 1))
+        walls = np.split(order, np.searchsorted(self._wall[order], np.arange(1, 2 * len(self.gaps))))
+        for wall in range(2 * len(self.gaps)):
+            a, b = walls[wall], walls[wall ^ 1]
             if len(a) and len(b):
-                out[g] = min(wall_distance(a, b), wall_distance(b, a))
+                points, inverse = np.unique(positions[a].reshape(-1, 3), axis=0, return_inverse=True)
+                out[a] = distances_from(positions[b], points)[inverse.ravel()].reshape(-1, 6)
         return out
+
+    def node_numbers(self, numbers):
+        """(facets of all walls, 6) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes` has them."""
+        return self._gather(numbers)
 
 
 class CellWalls:

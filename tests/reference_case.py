@@ -12,7 +12,7 @@ DATA = Path(__file__).resolve().parent / "data"
 
 
 def numbers():
-    """{name: number} of the converged state at 20 kPa; the same on all ranks (None for walls off rank 0)."""
+    """{name: number} of the converged state at 20 kPa; the same on all ranks."""
     from geometry.designfile import read_design
     from hifi.manipulator import ManipulatorSolve
     from hifi.newton import NewtonOptions
@@ -28,7 +28,7 @@ def numbers():
     for i, (e, k) in enumerate(zip(measured.strains.e, measured.strains.k), start=1):
         out |= {f"segment_{i}_e{j}": v for j, v in enumerate(e, start=1)}
         out |= {f"segment_{i}_k{j}_per_mm": v for j, v in enumerate(k, start=1)}
-    out |= {"smallest_wall_distance_mm": float(measured.walls.min())} if measured.walls is not None else {}
+    out |= {"smallest_wall_distance_mm": measured.touch.wall_distance, "body_distance_mm": measured.touch.body_distance}
     solve.destroy()
     return out
 

@@ -28,8 +28,9 @@ def scaled_strains(manipulator, pressure, model):
     return tuple(RodStrains([s.e for s in group], [s.k for s in group]) for group in (pieces, each))
 
 
-def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, solve=True, fields=True):
-    """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap` mm."""
+def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, contact=False, solve=True, fields=True):
+    """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap` mm there, with `contact`
+    as a contact model's penetration."""
     manipulator, model = Manipulator(segments), AnalyticModel()
     design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
     directory.mkdir(parents=True, exist_ok=True)
@@ -43,11 +44,11 @@ def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1
         return design
     (directory / "mesh").mkdir(exist_ok=True)
     (directory / "mesh" / "mesh.json").write_text(json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}}))
-    _solve(directory / "solve", design, model, reached, overlap, fields)
+    _solve(directory / "solve", design, model, reached, overlap, contact, fields)
     return design
 
 
-def _solve(folder, design, model, reached, overlap, fields):
+def _solve(folder, design, model, reached, overlap, contact, fields):
     folder.mkdir(exist_ok=True)
     manipulator = design.manipulator
     steps, centrelines, segments = [], [], []
@@ -56,7 +57,7 @@ def _solve(folder, design, model, reached, overlap, fields):
         pieces, each = scaled_strains(manipulator, p, model)
         line = centreline(lengths, pieces, spacing=3.0)
         work = (4, 2) if n else (0, 0)
-        steps.append([n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 1 + 5 * p, 1.5 * n])
+        steps.append([n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 1 + 5 * p, 1.5 * n])
         centrelines += [[n, p * 1e3, s, *point] for s, point in zip(line.s, line.points)]
         segments += [[n, p * 1e3, i + 1, *each.e[i], *each.k[i]] for i in range(len(manipulator.segments))]
     walls = [
@@ -67,7 +68,7 @@ def _solve(folder, design, model, reached, overlap, fields):
     ]
     if overlap:
         walls[0][4] = -overlap
-        steps[-1][8] = -overlap
+        steps[-1][8:10] = -overlap, int(not contact)
     write_csv(
         folder / "steps.csv",
         [
@@ -80,6 +81,9 @@ def _solve(folder, design, model, reached, overlap, fields):
             "tip_y_mm",
             "tip_z_mm",
             "smallest_wall_distance_mm",
+            "walls_overlap",
+            "body_distance_mm",
+            "body_overlap",
             "largest_stretch",
             "seconds",
         ],
@@ -100,6 +104,8 @@ def _solve(folder, design, model, reached, overlap, fields):
                 "dofs": 12345,
                 "versions": {"dolfinx": "0.5.2"},
                 "status": "reached",
+                "contact": contact,
+                "first_touch_kPa": 0.9e3 * design.pressure * reached if overlap else None,
                 "body": body_tables(manipulator),
                 "steps": [[1], [2]],
             }
@@ -123,6 +129,8 @@ def _fields(folder, manipulator, line):
     grid.point_data["displacement"] = moved - rest
     grid.point_data["stretch"] = 1 + 0.1 * np.abs(rest[:, 2])
     grid.point_data["pressure"] = np.zeros(grid.n_points)
+    facing = (rest[:, 2] > 2) & (np.abs(rest[:, 0] - 20.0) < 5)
+    grid.point_data["wall_distance_mm"] = np.where(facing, 0.1 * rest[:, 1], np.nan)
     grid.save(folder / "solution_0.vtu")
     (folder / "solution.pvd").write_text(
         '<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>'

@@ -84,7 +84,7 @@ def test_drawing_keeps_every_text_on_the_sheet_and_apart(segments):
 
 def test_view_holds_all_points_and_is_orthonormal():
     pytest.importorskip("matplotlib")
-    from design.bodies import PIXELS, view_of
+    from base.rendering import PIXELS, view_of
 
     points = np.random.default_rng(1).normal(size=(50, 3)) * [80, 20, 10]
     view = view_of(points)
@@ -96,7 +96,7 @@ def test_view_holds_all_points_and_is_orthonormal():
 
 def test_rendered_scale_is_the_views_scale():
     pyvista = pytest.importorskip("pyvista")
-    from design.bodies import render, view_of
+    from base.rendering import render, view_of
 
     view = view_of(np.array([[-30.0, 0, 0], [30, 0, 0], [0, 20, 20]]))
     image = render(view, [(pyvista.Sphere(radius=10.0, center=view.focus), {"color": "black", "ambient": 1.0, "diffuse": 0.0})])

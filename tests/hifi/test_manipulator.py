@@ -81,6 +81,8 @@ def test_walls_that_pass_through_each_other_are_negative(reference):
     if walls is not None:
         # walls shifted through each other by a gap's width: each point lies that far behind the other wall
         assert walls[:2] == pytest.approx([-middle.gap] * 2, rel=0.05)
+    touch = reference.measure().touch
+    assert touch.walls_overlap and not touch.body_overlap and touch.body_distance > 5  # neighbours only
 
 
 def test_mirror_design_mirrors(shared_directory):

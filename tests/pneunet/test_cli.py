@@ -33,10 +33,12 @@ length_mm = 25.0
 COMMANDS = ("design", "shape", "mesh", "solve", "report", "fit-material", "run", "doctor")
 STEPS = [
     "step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
-    "smallest_wall_distance_mm", "largest_stretch", "unstable_directions", "dead_load_fraction", "stability_factorisations", "seconds",
+    "smallest_wall_distance_mm", "walls_overlap", "body_distance_mm", "body_overlap", "largest_stretch", "unstable_directions",
+    "dead_load_fraction", "stability_factorisations", "seconds",
 ]  # fmt: skip
-CENTRELINES = ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"]
-SEGMENTS = ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"]
+MARKS = ["walls_overlap", "body_overlap"]
+CENTRELINES = ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm", *MARKS]
+SEGMENTS = ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm", *MARKS]
 
 
 def pneunet(*arguments, cwd):
@@ -156,19 +158,20 @@ def test_tables_of_a_solve_agree_with_each_other(folder):
         line = lines[lines[:, 0] == number]
         assert (line[:, 1] == pressure).all() and (np.diff(line[:, 2]) > 0).all()
         assert line[0, 2:] == pytest.approx(0.0, abs=1e-12)  # the base at the origin
-        assert line[-1, 2] == pytest.approx(manipulator.length) and line[-1, 3:] == pytest.approx(tip)
+        assert line[-1, 2] == pytest.approx(manipulator.length) and line[-1, 3:6] == pytest.approx(tip)
     assert steps[0, 5:8] == pytest.approx([manipulator.length, 0, 0], abs=1e-9)
-    assert (steps[:, 10] == 0).all()  # stable
+    assert (steps[:, 13] == 0).all()  # stable
     assert steps[-1, 7] < -0.5  # it bends away from its chambers
     segments = table(out / "segments.csv", SEGMENTS)
     assert segments[:, 0] == pytest.approx(steps[:, 0]) and (segments[:, 2] == 1).all()
-    assert segments[0, 3:] == pytest.approx([1, 0, 0, 0, 0, 0], abs=1e-9)
+    assert segments[0, 3:9] == pytest.approx([1, 0, 0, 0, 0, 0], abs=1e-9)
     assert segments[-1, 7] > 0.001 and abs(segments[-1, [6, 8]]).max() < 0.05 * segments[-1, 7]
     with open(out / "walls.csv", newline="") as stream:
         walls = list(csv.DictReader(stream))
     assert len(walls) == manipulator.chambers - 1
     assert min(float(w["distance_mm"]) for w in walls) == pytest.approx(steps[-1, 8])
     assert steps[0, 8] == pytest.approx(manipulator.segments[0].gap)
+    assert not steps[:, [9, 11]].any() and not lines[:, -2:].any() and not segments[:, -2:].any()  # nothing overlaps
 
 
 def test_record_of_a_solve_is_complete(folder):
@@ -197,7 +200,9 @@ def test_paraview_files_hold_the_fields(folder):
     assert abs(u[x < 1e-6]).max() < 1e-6
     on_tip = x > x.max() - 1e-6
     assert (grid.points + u)[on_tip].mean(axis=0) == pytest.approx(steps[-1, 5:8], abs=0.3)
-    assert 1.0 < grid["stretch"].max() <= steps[-1, 9]
+    assert 1.0 < grid["stretch"].max() <= steps[-1, 12]
+    distance = grid["wall_distance_mm"]
+    assert np.nanmin(distance) == pytest.approx(steps[-1, 8]) and 0 < np.isfinite(distance).sum() < 0.5 * len(distance)
     assert abs(grid["pressure"]).max() > 0.005
     assert grid.n_points > 0 and (grid.celltypes == pyvista.CellType.QUADRATIC_TETRA).all()
     rest = pyvista.read(out / listed[0].get("file"))

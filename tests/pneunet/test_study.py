@@ -101,6 +101,7 @@ def test_segments_one_of_which_cannot_reach_its_pressure(tmp_path, file):
     good, stopped = ([row for row in rows if row["status"] == status] for status in ("done", "stopped"))
     assert numbers(good, "pressure_kPa") == [0, 5] and float(good[1]["tip_z_mm"]) < -0.1
     assert 0 < float(good[1]["smallest_wall_distance_mm"]) < 1
+    assert [good[1][name] for name in ("walls_overlap", "body_overlap", "first_touch_kPa", "warnings")] == ["0", "0", "", ""]
     assert {row["mu_MPa"] for row in good} == {"0.3"} and {row["mu_MPa"] for row in stopped} == {"0.001"}
     assert 0 < float(stopped[-1]["pressure_kPa"]) < 5  # how far it came
     assert "was not reached" in stopped[0]["reason"] and f"cases/{stopped[0]['case']}/solve" in stopped[0]["reason"]
