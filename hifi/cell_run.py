@@ -21,6 +21,7 @@ from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath
 from hifi.results import KPA, limit_table, limit_text
 from hifi.stepping import StepSize, lagrange_coefficients, run_steps
+from hifi.wall_picture import draw_cell
 
 #: iterations that a lagged tangent may still need in contact, where tangents age fast
 CONTACT_PATIENCE = 10.0
@@ -156,7 +157,7 @@ HEADER = [
 
 
 def run_cell(path, directory, say=print):
-    """`pneunet cell`: solve CELL.toml; directory/cell gets cell.csv (a row a level), cell.msh and run.json."""
+    """`pneunet cell`: solve CELL.toml; directory/cell gets cell.csv (a row a level), cell.msh, run.json and walls.png, the last state."""
     case = read_cell(path)
     out = output_directory(Path(directory)) / "cell"
     rows, limit_points, started = [], [], time.perf_counter()
@@ -166,6 +167,7 @@ def run_cell(path, directory, say=print):
         say(limit_text(point))
 
     def keep(state):
+        last[:] = [state]
         e, k = state.strains.e, state.strains.k
         rows.append(
             [state.pressure * KPA, state.volume, *e, *k, np.linalg.norm(k), k @ e, *state.force, *state.moment, state.unstable]
@@ -186,7 +188,7 @@ def run_cell(path, directory, say=print):
         then = "beyond it states are marked 'walls overlap'" if case.contact == "none" else "contact holds them apart"
         say(f"walls touch at {touched[0]:.2f} kPa; {then}")
 
-    status, facts, touched = "reached what was asked for", {}, []
+    status, facts, touched, last = "reached what was asked for", {}, [], []
     try:
         _, facts = solve_cell(case, out / "cell.msh", keep, name, touch)
     except ConvergenceError as error:
@@ -205,4 +207,5 @@ def run_cell(path, directory, say=print):
     )
     if not facts:
         raise ConvergenceError(f"cell: {status}; {len(rows)} levels are in {out}; try less pressure or control = 'volume'")
-    say(f"done: {len(rows)} states in {out / 'cell.csv'}; K in N, N mm, N mm2 per unit of (e, k)")
+    drawn = draw_cell(CellProblem(case.segment, out / "cell.msh"), last[0], out / "walls.png")
+    say(f"done: {len(rows)} states in {out / 'cell.csv'}{', the last one in walls.png' * drawn}; K in N, N mm, N mm2 per unit of (e, k)")
