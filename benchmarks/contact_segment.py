@@ -1,0 +1,73 @@
+"""The finite segment of the part `contact`: five pairs of chambers of twist-w15 to 50 kPa, on as many ranks as it is started on.
+
+    pneunet run -n 2 -- python -m benchmarks.contact_segment FOLDER
+writes FOLDER/segment.json: the twist of the middle pitch and the forces between walls, at the pressures of `LEVELS`.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+CHAMBERS, SIZE, RANKS = 5, 2.0, 2
+LEVELS = (0.01, 0.02, 0.03, 0.04, 0.05)
+
+
+def run(folder):
+    from mpi4py import MPI
+
+    from base import se3
+    from base.materials import NeoHookean
+    from base.strains import RodStrains
+    from geometry import Manipulator
+    from geometry.mesh import mesh_manipulator
+    from hifi.agreement import on_rank_0
+    from hifi.manipulator import ManipulatorSolve
+    from hifi.wall_contact import WallPenalty
+    from tests.cases import CASES
+
+    segment = CASES["twist_w15"](angle=60.0, chambers=CHAMBERS, material=NeoHookean(0.317))
+    comm, body = MPI.COMM_WORLD, Manipulator((segment,))
+    on_rank_0(comm, lambda: mesh_manipulator(body, SIZE, folder) and None)
+    solve = ManipulatorSolve(body, folder / "manipulator.msh", contact=WallPenalty())
+    pitch, stations = body.segments[0].pitch, solve.sections.stations
+    centre = solve.sections.segment_stations[0][CHAMBERS // 2]
+    ends = [int(np.argmin(abs(stations - s))) for s in (centre - pitch / 2, centre + pitch / 2)]
+    rows = []
+
+    def note(m):
+        relative = se3.inverse_pose(m.frames[ends[:1]]) @ m.frames[ends[1:]]
+        strains = RodStrains.from_relative_pose(relative, np.diff(stations[ends]))
+        forces = np.linalg.norm(solve.problem.contact.forces(), axis=1)
+        twist = strains.k[0, 0] / strains.e[0, 0] * 1e3
+        rows.append({"pressure_kPa": m.pressure * 1e3, "twist_rad_per_m": twist, "forces_N": forces.tolist()})
+
+    solve.run(LEVELS[-1], note, milestones=LEVELS[:-1], stability=False)
+    kept = [r for r in rows if any(abs(r["pressure_kPa"] - 1e3 * p) < 1e-6 for p in LEVELS)]
+    facts = {"ranks": comm.size, "dofs": solve.problem.dofs, "mesh_size_mm": SIZE, "chambers": CHAMBERS, "levels": kept}
+    solve.destroy()
+    on_rank_0(comm, lambda: (folder / "segment.json").write_text(json.dumps(facts)) and None)
+
+
+def beside_cell(twists, folder):
+    """({key: value}, details) of the segment on two ranks beside the cell's `twists` {pressure in MPa: rad/m} on the same mesh size."""
+    from benchmarks.rivals import environment
+    from pneunet import launch
+
+    command = launch.command_line(RANKS, ["--", sys.executable, "-m", "benchmarks.contact_segment", str(folder)])
+    variables = launch.environment() | environment.ONE_THREAD | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=ROOT, env=variables, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"bench: contact in a segment failed: {done.stderr.strip()[-500:]}")
+    facts = json.loads((Path(folder) / "segment.json").read_text())
+    for level in facts["levels"]:
+        level["cell_twist_rad_per_m"] = min(twists.items(), key=lambda item: abs(item[0] * 1e3 - level["pressure_kPa"]))[1]
+    worst = max(abs(level["twist_rad_per_m"] / level["cell_twist_rad_per_m"] - 1) for level in facts["levels"])
+    return {"contact_segment_vs_cell_rel": worst}, facts
+
+
+if __name__ == "__main__":
+    run(Path(sys.argv[1]))
