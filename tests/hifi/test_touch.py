@@ -113,7 +113,7 @@ def rows(path):
 
 def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory):
     """Tall chambers a millimetre apart: touching at about 7.5 kPa; the run goes on later and does not forget."""
-    said, design = [], Design(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0)
+    said, design = [], Design(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0, contact="none")
     last = solve_design(design, shared_directory, fields=False, say=said.append)
     assert last.touch.walls_overlap and not last.touch.body_overlap and 6 < last.touch.walls_from.pressure * 1e3 < 9
     again = solve_design(design, shared_directory, pressure=0.010, fields=False, say=said.append, resume=True)
@@ -129,3 +129,18 @@ def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory):
             assert row["walls_overlap"] == str(int(float(row["pressure_kPa"]) > first)) and row["body_overlap"] == "0"
         assert all((float(row["smallest_wall_distance_mm"]) < 0) == (row["walls_overlap"] == "1") for row in steps)
         assert [step["walls_overlap"] for step in record["steps"]] == [row["walls_overlap"] == "1" for row in steps]
+
+
+def test_contact_holds_walls_apart_on_any_number_of_ranks_and_after_a_resumption(shared_directory):
+    said, design = [], Design(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0)
+    last = solve_design(design, shared_directory, fields=False, say=said.append)
+    again = solve_design(design, shared_directory, pressure=0.012, fields=False, say=said.append, resume=True)
+    for m in (last, again):
+        assert m.touch.contact and not m.touch.walls_overlap and 6 < m.touch.walls_from.pressure * 1e3 < 9
+        assert abs(m.touch.wall_distance) < 0.03 * TALL.gap
+    assert 0 < last.touch.contact_force < again.touch.contact_force
+    assert again.touch.walls_from.pressure == pytest.approx(last.touch.walls_from.pressure, rel=1e-9)
+    if MPI.COMM_WORLD.rank == 0:
+        out = shared_directory / "solve"
+        assert float(rows(out / "steps.csv")[-1]["contact_force_N"]) == again.touch.contact_force
+        assert not json.loads((out / "run.json").read_text())["walls_overlap"] and "held apart by contact" in "".join(said)
