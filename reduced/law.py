@@ -18,6 +18,7 @@ from geometry.parameters import TWISTING
 from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
 from reduced.gaussian import GaussianProcess
 from reduced.law_coordinates import LENGTHS, Coordinates, cosine
+from reduced.model import SegmentLaw
 from reduced.potential import Anharmonic, whitening
 
 SCHEMA = "pneunet-law-1"
@@ -79,31 +80,61 @@ class KindLaw:
         x = self._inputs(shape, pressure)
         return co.spread(shape, pressure, self.strains(x), self.strains.deviation(x))
 
-    def outside(self, shape, pressure):
-        """(n,) bool: where the law has not been taught."""
+    def excess(self, shape, pressure):
+        """(n, d + 1) how far a design lies outside what the law was taught: of each input in widths of its range, and of the leading
+        strain's deviation in units of the largest that counts as known; 0 inside."""
         x = self._inputs(shape, np.maximum(pressure, LOWEST))
-        box = ((x < self.low - 1e-9) | (x > self.high + 1e-9)).any(axis=1)
-        return box | (self.strains.deviation(x)[:, 0] > self.doubt)
+        width = np.maximum(self.high - self.low, 1.0)  # a level's may be 0
+        box = np.maximum(np.maximum(self.low - x, x - self.high) - 1e-9, 0) / width
+        return np.column_stack([box, np.maximum(self.strains.deviation(x)[:, 0] / self.doubt - 1, 0)])
 
 
-@dataclass(frozen=True)
-class RodLaw:
+@dataclass(frozen=True, eq=False)
+class RodLaw(SegmentLaw):
     """kinds: {kind: KindLaw}; about: how it was trained."""
 
     kinds: dict
     about: dict
-    name = "trained"
+    name: str = "trained"
+
+    def _kind(self, segment):
+        if segment.kind not in self.kinds:
+            known = " and ".join(self.kinds)
+            raise InputError(f"kind = '{segment.kind}': the law '{self.name}' knows {known} segments only: take --law analytic")
+        return self.kinds[segment.kind]
 
     def of(self, segment):
         """The SectionLaw of a Segment; InputError for a kind that it was not taught."""
-        if segment.kind not in self.kinds:
-            raise InputError(f"kind = '{segment.kind}': this law was trained on {', '.join(self.kinds)} segments only")
-        return SectionLaw(self.kinds[segment.kind], shape_numbers(segment), normal_pitch(segment), segment.material.mu, _ties(segment))
+        return SectionLaw(self._kind(segment), shape_numbers(segment), normal_pitch(segment), segment.material.mu, _ties(segment))
 
     def strains(self, segment, pressure):
-        """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa (a reduced.model.SegmentLaw)."""
-        q = self.of(segment).free_strains(np.asarray(pressure, float))
+        """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa, a number or an array."""
+        pressure = np.asarray(pressure, float)
+        if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
+            raise InputError("pressure_kPa: give finite values >= 0")
+        q = self.of(segment).free_strains(pressure)
         return RodStrains(q[..., :3], q[..., 3:])
+
+    def table(self, segments, pressures):
+        """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
+        q = np.empty((len(segments), len(pressures), 6))
+        for kind in {s.kind for s in segments}:
+            rows = [i for i, s in enumerate(segments) if s.kind == kind]
+            chosen = [segments[i] for i in rows]
+            shape = np.repeat([shape_numbers(s) for s in chosen], len(pressures), axis=0)
+            P = np.concatenate([np.asarray(pressures, float) / s.material.mu for s in chosen])
+            pitch = np.array([normal_pitch(s) for s in chosen])[:, None, None]
+            q[rows] = self._kind(chosen[0]).free_strains(shape, P).reshape(len(rows), -1, 6)
+            q[rows, :, 3:] = q[rows, :, 3:] / pitch
+        return RodStrains(q[..., :3], q[..., 3:])
+
+    def excess(self, segment, pressure):
+        """(d,) how far a segment at a pressure (MPa) lies outside what the law was taught; KindLaw.excess."""
+        return self._kind(segment).excess(shape_numbers(segment)[None], np.array([pressure / segment.material.mu]))[0]
+
+    def doubts(self, segment, pressure):
+        """Reasons, as text, not to trust the law for a segment at a pressure (MPa) or several; () when there are none."""
+        return self.of(segment).doubts(pressure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +170,19 @@ class SectionLaw:
 
     def doubts(self, P):
         """Reasons, as text, not to trust the law at this pressure; () when there are none."""
-        outside = self.law.outside(*self._rows(P)).any()
-        return self.remarks + (("design or pressure lies outside the data that the law was trained on",) if outside else ())
+        shape, p = self._rows(P)
+        law, co = self.law, self.law.coordinates
+        excess = law.excess(shape, p)
+        told = co.told(law._inputs(shape, p)[excess.max(axis=1).argmax()])
+        known = np.sort([co.told(law.low), co.told(law.high)], axis=0).T
+        reasons = [
+            f"{name} = {value:.3g} is outside the trained law's {low:.3g} to {high:.3g}"
+            for name, value, (low, high), out in zip(co.names, told, known, excess.max(axis=0) > 0)
+            if out
+        ]
+        if excess[:, -1].max() > 0 and not reasons:
+            reasons = ["the trained law knows no design near this one"]
+        return self.remarks + tuple(reasons)
 
     def _state(self, q, P):
         """(shape of the answer, v (n, 6), M (n, 6, 6), D1 (n,), c (n,))."""
@@ -212,10 +254,10 @@ def write_law(path, law):
     write_archive(path, SCHEMA, about, arrays)
 
 
-def read_law(path):
-    """The RodLaw in a file; InputError when it is none or of another version."""
+def read_law(path, name=None):
+    """The RodLaw in a file, by default named like it; InputError when it is none or of another version."""
     with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, stored):
-        return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about)
+        return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about, name or str(path))
 
 
 def _triangle(flat):

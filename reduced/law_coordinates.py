@@ -47,6 +47,17 @@ class Coordinates:
             [cosine(shape) ** 2, np.log(shape[:, columns]), np.log(pressure + SMALL_PRESSURE), np.broadcast_to(level, len(shape))]
         )
 
+    @property
+    def names(self):
+        """What `told` gives."""
+        lengths = [f"{name}_mm / normal pitch" for name in LENGTHS[self.kind]]
+        return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh"]
+
+    def told(self, inputs):
+        """(d,) inputs (d,) as a user knows them: degrees, ratios."""
+        angle = np.degrees(np.arccos(np.sqrt(inputs[0])))
+        return np.array([angle, *np.exp(inputs[1:-2]), max(np.exp(inputs[-2]) - SMALL_PRESSURE, 0.0), inputs[-1]])
+
     # ---- free strains
     @property
     def strain_parity(self):

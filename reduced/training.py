@@ -32,6 +32,8 @@ TIP_LENGTH = 100.0
 PITCH = 5.0
 #: parts of the training designs in the learning curve
 CURVE = (0.25, 0.5, 1.0)
+#: the training designs' ranges are widened by this part before a design is outside
+MARGIN = 0.02
 #: a deviation above this many times the largest one at the training points is outside
 DOUBT = 2.0
 
@@ -129,7 +131,10 @@ def fit_kind(states, prescribed):
     anharmonic = fit_anharmonic(states.kind, cosine(f.shape), _symmetric(f.matrices), prescribed.change, prescribed.forces)
     x = states.inputs
     doubt = DOUBT * float(strains.deviation(x)[:, 0].max())
-    law = KindLaw(states.kind, strains, stiffness, anharmonic, np.ones(6), x.min(axis=0), x.max(axis=0), doubt, int(states.level.max()))
+    margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
+    low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
+    low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
+    law = KindLaw(states.kind, strains, stiffness, anharmonic, np.ones(6), low, high, doubt, int(states.level.max()))
     quantile = _quantiles(law, states)
     return replace(law, quantile=quantile)
 

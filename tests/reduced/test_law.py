@@ -1,12 +1,13 @@
 """The trained law on made-up cells: a smooth law that obeys the symmetries, in the schema of the data set."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from base.dataset import UPPER, CellData, columns, write_dataset
 from base.errors import InputError
 from base.materials import NeoHookean, Yeoh
-from geometry import Segment
 from geometry.parameters import KINDS, ONE_SIDED, TWISTING
 from geometry.shape_numbers import SHAPE, segment_of, shape_numbers
 from reduced.law import RodLaw, read_law
@@ -152,14 +153,27 @@ def test_held_out_figures_of_an_easy_law_are_small_and_its_intervals_honest(trai
         assert figures["law_interval_coverage_90"] > 0.7
 
 
-def test_it_says_when_it_is_asked_outside(trained):
-    law = trained[0]
-    assert law.of(design(ONE_SIDED)).doubts(0.25 * 0.5)  # P/mu = 0.5
-    assert law.of(Segment(ONE_SIDED, 60.0, 1, width=40.0, material=NeoHookean(mu=0.25))).doubts(0.01)
+def test_it_says_when_it_is_asked_outside_and_by_how_much(trained):
+    law, segment = trained[0], design(ONE_SIDED)
+    for kind in KINDS:
+        assert law.doubts(design(kind), [0.01, 0.05]) == () and (law.excess(design(kind), 0.05) == 0).all()
+    assert any("pressure / mu = 0.5 is outside" in text for text in law.doubts(segment, [0.01, 0.25 * 0.5]))
+    assert law.excess(segment, 0.2).max() > law.excess(segment, 0.15).max() > 0
+    wide = replace(segment, width=40.0)
+    assert any("width_mm / normal pitch = 10 is outside" in text for text in law.doubts(wide, 0.01))
     other = design(ONE_SIDED, material=Yeoh(c10=0.125, c20=0.01))
-    assert any("neo-Hookean" in text for text in law.of(other).doubts(0.05))
-    with pytest.raises(InputError, match="one-sided segments only"):
-        RodLaw({ONE_SIDED: law.kinds[ONE_SIDED]}, {}).of(design(TWISTING))
+    assert any("neo-Hookean" in text for text in law.doubts(other, 0.05))
+    with pytest.raises(InputError, match="knows one-sided segments only: take --law analytic"):
+        RodLaw({ONE_SIDED: law.kinds[ONE_SIDED]}, {}).strains(design(TWISTING), 0.01)
+
+
+def test_a_table_of_designs_holds_what_single_calls_give(trained):
+    law, P = trained[0], [0.0, 0.03, 0.06]
+    segments = [design(ONE_SIDED, 50.0), design(TWISTING, 120.0), design(ONE_SIDED, 90.0, pitch=7.0)]
+    found = law.table(segments, P)
+    for i, segment in enumerate(segments):
+        one = law.strains(segment, P)
+        assert found.e[i] == pytest.approx(one.e) and found.k[i] == pytest.approx(one.k)
 
 
 def test_a_file_gives_the_same_law(trained):
