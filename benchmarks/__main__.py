@@ -66,7 +66,7 @@ MEANING = {
     "dataset_one_sided": "data set of cells: accepted one-sided designs",
     "dataset_twisting": "data set of cells: accepted twisting designs",
     "dataset_accepted_fraction": "data set of cells: cases accepted over cases computed",
-    "law_strain_median_rel": "trained law on unseen designs, the worse kind: |d(e, k pitch)| over the free strains' norm at top pressure, median",
+    "law_strain_median_rel": "law, unseen designs, the worse kind: |d(e, k pitch)| over the free strains' norm at top pressure, median",
     "law_strain_p95_rel": "the same, 95th percentile",
     "law_tip100_p95_rel": "the same designs: distance of the tips of free segments of 100 mm over 100 mm, 95th percentile",
     "law_stiffness_p95_rel": "the same designs: largest |1 - eigenvalue| of K_FE^-1 K, 95th percentile",

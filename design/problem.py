@@ -44,8 +44,7 @@ class Trial:
 
     def centreline(self, law, base_point):
         """The Centreline from base_point (3,), mm."""
-        strains = [law.strains(segment, self.pressure) for segment in self.segments]
-        pieces = free_manipulator(self.segments, strains, self.counts)
+        pieces = free_manipulator(self.segments, law.each(self.segments, self.pressure), self.counts)
         return centreline(*pieces, SPACING, se3.make_pose(self.rotation, base_point))
 
 

@@ -19,16 +19,14 @@ def end_turn(segment, free):
     return float(free[3] * segment.core_bottom - free[1]) if segment.kind == ONE_SIDED else 0.0
 
 
-def free_pieces(segment, strains, count=None):
-    """(lengths (3,) in mm, e (3, 3), k (3, 3)) of a segment's pieces at its cells' free RodStrains; count: chambers, a real number."""
-    count = segment.chambers if count is None else count
-    lengths = [segment.end_wall, count * segment.pitch, segment.end_wall]
-    bent = end_turn(segment, np.concatenate([strains.e, strains.k])) / segment.end_wall
-    rest = RodStrains.unstrained()
-    return lengths, [rest.e, strains.e, rest.e], [[0.0, 0.0, bent], strains.k, [0.0, 0.0, -bent]]
-
-
 def free_manipulator(segments, strains, counts):
-    """(lengths (3 n,), RodStrains (3 n, 3)) of n segments in a row."""
-    lengths, e, k = (sum(parts, []) for parts in zip(*(free_pieces(*one) for one in zip(segments, strains, counts))))
-    return lengths, RodStrains(e, k)
+    """(lengths (3 n,) in mm, RodStrains (3 n, 3)) of n segments in a row: the pieces of each, at its cells' free RodStrains (n, 3);
+    counts: of chambers, real numbers."""
+    lengths, e, k = np.empty((len(segments), 3)), np.zeros((len(segments), 3, 3)), np.zeros((len(segments), 3, 3))
+    e[:, :, 0], e[:, 1], k[:, 1] = 1.0, strains.e, strains.k
+    for i, (segment, count, free) in enumerate(zip(segments, counts, np.hstack([strains.e, strains.k]))):
+        bare = segment.end_wall
+        lengths[i] = bare, count * segment.pitch, bare
+        k[i, 0, 2] = end_turn(segment, free) / bare
+    k[:, 2, 2] = -k[:, 0, 2]
+    return lengths.ravel(), RodStrains(e.reshape(-1, 3), k.reshape(-1, 3))

@@ -18,7 +18,7 @@ from geometry.parameters import TWISTING
 from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
 from reduced.gaussian import GaussianProcess
 from reduced.law_coordinates import LENGTHS, Coordinates, cosine
-from reduced.model import SegmentLaw
+from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, whitening
 
 SCHEMA = "pneunet-law-1"
@@ -109,24 +109,25 @@ class RodLaw(SegmentLaw):
 
     def strains(self, segment, pressure):
         """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa, a number or an array."""
-        pressure = np.asarray(pressure, float)
-        if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
-            raise InputError("pressure_kPa: give finite values >= 0")
-        q = self.of(segment).free_strains(pressure)
+        q = self.of(segment).free_strains(checked_pressure(pressure))
         return RodStrains(q[..., :3], q[..., 3:])
 
     def table(self, segments, pressures):
         """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
-        q = np.empty((len(segments), len(pressures), 6))
+        q, pressures = np.empty((len(segments), len(pressures), 6)), checked_pressure(pressures)
         for kind in {s.kind for s in segments}:
             rows = [i for i, s in enumerate(segments) if s.kind == kind]
             chosen = [segments[i] for i in rows]
             shape = np.repeat([shape_numbers(s) for s in chosen], len(pressures), axis=0)
-            P = np.concatenate([np.asarray(pressures, float) / s.material.mu for s in chosen])
-            pitch = np.array([normal_pitch(s) for s in chosen])[:, None, None]
+            P = np.concatenate([pressures / s.material.mu for s in chosen])
             q[rows] = self._kind(chosen[0]).free_strains(shape, P).reshape(len(rows), -1, 6)
-            q[rows, :, 3:] = q[rows, :, 3:] / pitch
+        q[..., 3:] /= np.array([normal_pitch(s) for s in segments])[:, None, None]
         return RodStrains(q[..., :3], q[..., 3:])
+
+    def each(self, segments, pressure):
+        """RodStrains (n, 3) of n segments at one pressure in MPa, all at once."""
+        found = self.table(segments, [pressure])
+        return RodStrains(found.e[:, 0], found.k[:, 0])
 
     def excess(self, segment, pressure):
         """(d,) how far a segment at a pressure (MPa) lies outside what the law was taught; KindLaw.excess."""

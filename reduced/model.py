@@ -22,6 +22,11 @@ class SegmentLaw(ABC):
     def strains(self, segment, pressure):
         """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa, a number or an array."""
 
+    def each(self, segments, pressure):
+        """RodStrains (n, 3) of n segments at one pressure in MPa."""
+        found = [self.strains(s, float(pressure)) for s in segments]
+        return RodStrains([q.e for q in found], [q.k for q in found])
+
     def table(self, segments, pressures):
         """RodStrains (n, m, 3) of n segments at increasing pressures (m,) in MPa; nan from where there is no equilibrium."""
         e, k = np.full((2, len(segments), len(pressures), 3), np.nan)
@@ -43,6 +48,14 @@ class SegmentLaw(ABC):
         return ()
 
 
+def checked_pressure(pressure):
+    """Pressure as an array; InputError where it is not finite or negative."""
+    pressure = np.asarray(pressure, float)
+    if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
+        raise InputError("pressure_kPa: give finite values >= 0")
+    return pressure
+
+
 class AnalyticModel(SegmentLaw):
     """The two analytic laws: the twisting tube and the one-sided minimum-potential-energy cell.
 
@@ -61,10 +74,7 @@ class AnalyticModel(SegmentLaw):
 
         ConvergenceError, with the pressure reached, where the model has no stable equilibrium.
         """
-        pressure = np.asarray(pressure, float)
-        if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
-            raise InputError("pressure_kPa: give finite values >= 0")
-        key = segment.key
+        pressure, key = checked_pressure(pressure), segment.key
         levels, where = np.unique(pressure, return_inverse=True)
         e, k = self._solved(key, tuple(levels.tolist()))
         where = where.reshape(pressure.shape)
@@ -103,9 +113,9 @@ def predict(manipulator, pressure, law, spacing=1.0, base_pose=None):
 
     spacing in mm; base_pose (4, 4) the base frame, default the identity.
     """
-    strains = [law.strains(s, float(pressure)) for s in manipulator.segments]
-    counts = [s.chambers for s in manipulator.segments]
-    return centreline(*free_manipulator(manipulator.segments, strains, counts), spacing, base_pose)
+    segments = manipulator.segments
+    pieces = free_manipulator(segments, law.each(segments, pressure), [s.chambers for s in segments])
+    return centreline(*pieces, spacing, base_pose)
 
 
 def doubts(manipulator, pressure, law):

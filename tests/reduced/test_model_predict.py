@@ -44,7 +44,7 @@ def test_cells_count_with_whole_pitches_and_frames_are_continuous():
     assert line.s[-1] == pytest.approx(ARM.length)
     ends = np.concatenate([ARM.starts, ARM.starts + [s.length for s in ARM.segments]])
     assert all(np.isclose(line.s, end).any() for end in ends)
-    free = [AnalyticModel().strains(s, 0.03) for s in ARM.segments]
+    free = AnalyticModel().each(ARM.segments, 0.03)
     lengths, strains = free_manipulator(ARM.segments, free, [s.chambers for s in ARM.segments])
     assert lengths[1::3] == pytest.approx([s.chambers * s.pitch for s in ARM.segments])
     assert sum(lengths) == pytest.approx(ARM.length)
