@@ -48,7 +48,8 @@ class GaussianProcess:
         """(n, p) at inputs (n, d); with `derivative` also (n, p, d)."""
         z = (x - self.shift) / self.width
         a, m = z / self.scales, len(self.points)
-        kernel, (smooth, constant, slopes) = _kernel(a, self.points), np.split(self.weights, [m, m + 1])
+        smooth, constant, slopes = self.weights[:m], self.weights[m], self.weights[m + 1 :]
+        kernel = _kernel(a, self.points)
         curved = kernel @ smooth
         mean = curved + constant + z @ slopes
         if not derivative:
@@ -67,6 +68,29 @@ class GaussianProcess:
         missed = 1 - (solve_triangular(self._kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
         known = self.noise * (solve_triangular(self.root, basis.T, trans="T") ** 2).sum(axis=0)
         return np.sqrt((known + np.maximum(missed, 0))[:, None] * self.variance)
+
+
+@dataclass(frozen=True)
+class SideBySide:
+    """Gaussian processes of consecutive outputs, each with scales and noise of its own, as one."""
+
+    processes: tuple
+
+    def __call__(self, x, derivative=False):
+        found = [process(x, derivative) for process in self.processes]
+        if not derivative:
+            return np.concatenate(found, axis=1)
+        return tuple(np.concatenate(part, axis=1) for part in zip(*found))
+
+    def deviation(self, x):
+        return np.concatenate([process.deviation(x) for process in self.processes], axis=1)
+
+
+def fit_side_by_side(x, y, group, trust, widths, like=None):
+    """SideBySide processes of `widths` outputs each; the rest as for `fit`."""
+    ends = np.cumsum([0, *widths])
+    likes = like.processes if like else [None] * len(widths)
+    return SideBySide(tuple(fit(x, y[:, a:b], group, trust[:, a:b], like=known) for a, b, known in zip(ends, ends[1:], likes)))
 
 
 def _kernel(a, b):

@@ -39,7 +39,8 @@ def stiffness_error(states, K):
 def force_error(law, sample):
     """(m,) norm of the force error over that of the force, whitened by the stiffness; law alone, its free states included."""
     f = sample.around
-    free, K = law.free_strains(f.shape, f.pressure), law.free_stiffness(f.shape, f.pressure)
+    free = law.free_strains(f.shape, f.pressure)
+    K = law.stiffness_at(f.shape, free)
     M, D1 = whitening(law.kind, K)
     v = np.einsum("nij,nj->ni", M, f.strains + sample.change - free)
     by_v = D1[:, None] * (v + law.anharmonic.gradient(v, cosine(f.shape)))

@@ -6,7 +6,7 @@ free_strains(P), psi(q, P), force(q, P), stiffness(q, P). Everything else is wit
 """
 
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from base.materials import NeoHookean
 from base.strains import RodStrains
 from geometry.parameters import TWISTING
 from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
-from reduced.gaussian import GaussianProcess
+from reduced.gaussian import GaussianProcess, SideBySide
 from reduced.law_coordinates import LENGTHS, Coordinates, cosine
 from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, whitening
@@ -30,13 +30,13 @@ LOWEST = 1e-9
 
 @dataclass(frozen=True)
 class KindLaw:
-    """The law of one kind. strains, stiffness: GaussianProcess of Coordinates; quantile (6,): what a standard deviation of each
+    """The law of one kind. strains, stiffness: processes of Coordinates; quantile (6,): what a standard deviation of each
     strain is multiplied by for a 90 % interval; low, high (d,): range of the inputs; doubt: largest deviation of the leading
     strain that counts as known; level: the mesh that is predicted, by its place among those trained on, the finest last."""
 
     kind: str
-    strains: GaussianProcess
-    stiffness: GaussianProcess
+    strains: SideBySide
+    stiffness: SideBySide
     anharmonic: Anharmonic
     quantile: np.ndarray
     low: np.ndarray
@@ -44,7 +44,7 @@ class KindLaw:
     doubt: float
     level: int = 0
 
-    @property
+    @cached_property
     def coordinates(self):
         return Coordinates(self.kind)
 
@@ -66,8 +66,12 @@ class KindLaw:
 
     def free_stiffness(self, shape, pressure):
         """(n, 6, 6) tangent stiffness of the free states."""
+        return self.stiffness_at(shape, self.free_strains(shape, pressure))
+
+    def stiffness_at(self, shape, strains):
+        """(n, 6, 6) the same, of free states with these strains (n, 6)."""
         co = self.coordinates
-        return co.stiffness(shape, self.stiffness(self._inputs(shape, pressure)))
+        return co.stiffness(shape, self.stiffness(co.stiffness_inputs(shape, strains, self.level)))
 
     def half_width(self, shape, pressure):
         """(n, 6) half of the 90 % interval of each free strain."""
@@ -155,7 +159,8 @@ class SectionLaw:
     def _free_state(self, *pressures):
         """(free strains (n, 6), M (n, 6, 6), D1 (n,)) without dimension at pressures in MPa."""
         shape, p = self._rows(pressures)
-        return self.law.free_strains(shape, p), *whitening(self.law.kind, self.law.free_stiffness(shape, p))
+        free = self.law.free_strains(shape, p)
+        return free, *whitening(self.law.kind, self.law.stiffness_at(shape, free))
 
     def _rows(self, P):
         p = np.atleast_1d(np.asarray(P, float)).ravel() / self.mu
@@ -244,14 +249,15 @@ def write_law(path, law):
     arrays = {}
     for kind, k in law.kinds.items():
         for name in ("strains", "stiffness"):
-            for f in fields(GaussianProcess):
-                value = np.asarray(getattr(getattr(k, name), f.name))
-                if f.name == "root":  # of the stiffness nobody asks the deviation
-                    value = value[np.triu_indices(len(value))].astype("f4")[: 0 if name == "stiffness" else None]
-                arrays[f"{kind}/{name}/{f.name}"] = value
+            for number, process in enumerate(getattr(k, name).processes):
+                for f in fields(GaussianProcess):
+                    value = np.asarray(getattr(process, f.name))
+                    if f.name == "root":  # of the stiffness nobody asks the deviation
+                        value = value[np.triu_indices(len(value))].astype("f4")[: 0 if name == "stiffness" else None]
+                    arrays[f"{kind}/{name}/{number}/{f.name}"] = value
         arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
         arrays |= {f"{kind}/coefficients": k.anharmonic.coefficients, f"{kind}/reach": np.asarray(k.anharmonic.reach)}
-    about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": LENGTHS, **law.about}
+    about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": {k: list(v) for k, v in LENGTHS.items()}, **law.about}
     write_archive(path, SCHEMA, about, arrays)
 
 
@@ -272,9 +278,13 @@ def _triangle(flat):
 def _read_kind(stored, kind):
     processes = {}
     for name in ("strains", "stiffness"):
-        values = {f.name: stored[f"{kind}/{name}/{f.name}"] for f in fields(GaussianProcess)}
-        values |= {name: float(values[name]) for name in ("noise", "common_noise")} | {"root": _triangle(values["root"])}
-        processes[name] = GaussianProcess(**values)
+        processes[name], number = [], 0
+        while f"{kind}/{name}/{number}/noise" in stored:
+            values = {f.name: stored[f"{kind}/{name}/{number}/{f.name}"] for f in fields(GaussianProcess)}
+            values |= {one: float(values[one]) for one in ("noise", "common_noise")} | {"root": _triangle(values["root"])}
+            processes[name].append(GaussianProcess(**values))
+            number += 1
+    processes = {name: SideBySide(tuple(found)) for name, found in processes.items()}
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, stored[f"{kind}/coefficients"], float(stored[f"{kind}/reach"]))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])

@@ -160,7 +160,7 @@ def test_it_says_when_it_is_asked_outside_and_by_how_much(trained):
     assert any("pressure / mu = 0.5 is outside" in text for text in law.doubts(segment, [0.01, 0.25 * 0.5]))
     assert law.excess(segment, 0.2).max() > law.excess(segment, 0.15).max() > 0
     wide = replace(segment, width=40.0)
-    assert any("width_mm / normal pitch = 10 is outside" in text for text in law.doubts(wide, 0.01))
+    assert any("width / normal pitch = 10 is outside" in text for text in law.doubts(wide, 0.01))
     other = design(ONE_SIDED, material=Yeoh(c10=0.125, c20=0.01))
     assert any("neo-Hookean" in text for text in law.doubts(other, 0.05))
     with pytest.raises(InputError, match="knows one-sided segments only: take --law analytic"):
