@@ -70,7 +70,7 @@ MEANING = {
     "law_strain_p95_rel": "the same, 95th percentile",
     "law_tip100_p95_rel": "the same designs: distance of the tips of free segments of 100 mm over 100 mm, 95th percentile",
     "law_stiffness_p95_rel": "the same designs: largest |1 - eigenvalue| of K_FE^-1 K, 95th percentile",
-    "law_force_p95_rel": "the same designs at prescribed strains: error of the forces, whitened by K_FE, 95th percentile",
+    "law_force_p95_rel": "the same designs at twice the free strains: error of the forces, whitened by K_FE, 95th percentile",
     "law_interval_coverage_90": "the same designs: share of free strains within their 90 % intervals, of the kind that is further from 0.9",
     "law_batch_10k_seconds": "free strains and their slopes of 10,000 (design, pressure), the dearer kind: best CPU s",
     "law_single_us": "free strains of one segment at one pressure, the dearer kind: best CPU us",

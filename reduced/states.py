@@ -65,6 +65,12 @@ class Sample:
         return Sample(self.free.of(self.free.level == level), self.around.of(held), self.change[held], self.forces[held])
 
     @property
+    def doubled(self):
+        """(m,) bool: prescribed are twice the free strains, others than those went in some direction."""
+        free = self.around.strains - REST
+        return np.linalg.norm(self.change - free, axis=1) < 1e-3 * np.linalg.norm(free, axis=1)
+
+    @property
     def designs(self):
         return np.unique(self.free.design)
 

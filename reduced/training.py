@@ -44,9 +44,11 @@ def fit_strains(states, like=None):
     """Gaussian processes of the learned free strains: the leading one has scales of its own (measured: a quarter off its error)."""
     states = states.loaded
     co = Coordinates(states.kind)
-    y = co.learned_strains(states.shape, states.pressure, states.strains)
+    with np.errstate(invalid="ignore"):
+        y = co.learned_strains(states.shape, states.pressure, states.strains)
+    good = np.isfinite(y).all(axis=1)  # the leading strain is larger than 0
     trust = odd(co.strain_parity, np.abs(cosine(states.shape)))
-    return gaussian.fit_side_by_side(states.inputs, y, states.case, trust, (1, y.shape[1] - 1), like)
+    return gaussian.fit_side_by_side(states.inputs[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), like)
 
 
 def fit_stiffness(states, like=None):
