@@ -250,6 +250,13 @@ def test_shapes_beyond_the_reduced_models_limit_keep_the_others(folder, capsys, 
     assert (folder / "out" / "shape" / "centrelines.csv").is_file()
 
 
+@pytest.mark.parametrize("command", ["design", "shape", "report"])
+def test_a_law_that_is_none_is_one_line(folder, capsys, command):
+    assert main([command, "good.toml", "--law", "best"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "--law best: write 'trained', 'analytic' or the .npz file" in error
+
+
 STUDY = """kind = "cell"
 levels = 1
 [base]
