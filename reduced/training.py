@@ -179,14 +179,20 @@ def learning_curve(training, held_out):
 # ---- the command
 
 
-def samples_of(data):
-    """{kind: (training Sample, held-out Sample)}; InputError where they are too few."""
+def samples_of(data, say=lambda text: None):
+    """{kind: (training Sample, held-out Sample)} of the kinds of which there are enough; InputError where there is none."""
     out = {}
     for kind in data.about["kinds"]:
-        out[kind] = training, held_out = [sample_of(data, kind, held) for held in (False, True)]
-        designs, held = (len(sample.designs) for sample in out[kind])
-        if designs < 2 * FOLDS or not held or not len(training.forces) or not len(held_out.forces):
-            raise InputError(f"{designs} accepted {kind} designs, {held} held out: too few, or no prescribed states, to train on")
+        pair = training, held_out = tuple(sample_of(data, kind, held) for held in (False, True))
+        designs, held = (len(sample.designs) for sample in pair)
+        text = f"{kind}: {designs} designs to train on, {held} held out"
+        if designs < 2 * FOLDS or not held or not len(training.forces):
+            say(f"{text}: too few, or no prescribed states: the law will not know this kind")
+            continue
+        say(text)
+        out[kind] = pair
+    if not out:
+        raise InputError(f"too few accepted designs of any kind to train on ({text})")
     return out
 
 
@@ -202,11 +208,9 @@ def run_training(path, out, say=print, compare=True, mapping=map):
     """
     data, started = read_dataset(path), time.perf_counter()
     try:
-        samples = samples_of(data)
+        samples = samples_of(data, say)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    for kind, (training, held_out) in samples.items():
-        say(f"{kind}: {len(training.designs)} designs to train on, {len(held_out.designs)} held out")
     jobs = [(fit_kind, (training,)) for training, _ in samples.values()]
     if compare:
         jobs += [(job, pair) for pair in samples.values() for job in (compare_laws, learning_curve)]

@@ -13,7 +13,7 @@ from geometry.shape_numbers import SHAPE, segment_of, shape_numbers
 from reduced.law import RodLaw, read_law
 from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
-from reduced.training import run_training
+from reduced.training import run_training, samples_of
 
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
 
@@ -90,6 +90,15 @@ def trained(tmp_path_factory):
 def design(kind, angle=63.0, material=None, pitch=4.0):
     shape = np.array([angle, 2.0, 0.9, 0.33, 0.2, 0.27, 0.18, 0.18, 0.45, 0.18, 0.45, 0.3, 0.15])
     return segment_of(kind, shape, pitch, material or NeoHookean(mu=0.25))
+
+
+def test_a_kind_of_few_designs_is_left_out_and_said():
+    data, said = made_up_data(), []
+    few = replace(data, status=((data.kind == 1) & (data.design > 5)).astype("i1"))
+    assert list(samples_of(few, said.append)) == [ONE_SIDED]
+    assert any(line.startswith("twisting: ") and "will not know this kind" in line for line in said)
+    with pytest.raises(InputError, match="too few accepted designs of any kind"):
+        samples_of(replace(data, status=np.ones_like(data.status)))
 
 
 @pytest.mark.parametrize("kind", KINDS)
