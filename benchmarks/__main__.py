@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, contact, rod, segments, speed, verification
+from benchmarks import cell, chain, contact, law, rod, segments, speed, verification
 from benchmarks.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,6 +28,7 @@ PARTS = {
     "segments": (segments.against_segments, "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes"),
     "rod": (rod.speed, "what free and loaded shapes of a rod of four segments cost; some seconds"),
     "rod-fe": (rod.against_finite_elements, "rods with unit cells' laws against finite elements of three bodies; some 5 minutes"),
+    "law": (law.law, "the trained law that comes along: errors on designs it has not seen, the laws compared, cost; some 3 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by penalty; some 20 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
@@ -62,6 +63,19 @@ MEANING = {
     "rod_vs_fe_rms_rel_max": "the same: largest RMS distance of the centrelines over the length",
     "rod_vs_fe_tip_rel_max_without_ends": "the tips' distance with the end effects switched off",
     "rod_vs_fe_rms_rel_max_without_ends": "the centrelines' distance with the end effects switched off",
+    "dataset_one_sided": "data set of cells: accepted one-sided designs",
+    "dataset_twisting": "data set of cells: accepted twisting designs",
+    "dataset_accepted_fraction": "data set of cells: cases accepted over cases computed",
+    "law_strain_median_rel": "law, unseen designs, the worse kind: |d(e, k pitch)| over the free strains' norm at top pressure, median",
+    "law_strain_p95_rel": "the same, 95th percentile",
+    "law_tip100_p95_rel": "the same designs: distance of the tips of free segments of 100 mm over 100 mm, 95th percentile",
+    "law_stiffness_p95_rel": "the same designs: largest |1 - eigenvalue| of K_FE^-1 K, 95th percentile",
+    "law_force_p95_rel": "the same designs at twice the free strains: error of the forces, whitened by K_FE, 95th percentile",
+    "law_interval_coverage_90": "the same designs: share of free strains within their 90 % intervals, of the kind that is further from 0.9",
+    "law_batch_10k_seconds": "free strains and their slopes of 10,000 (design, pressure), the dearer kind: best CPU s",
+    "law_single_us": "free strains of one segment at one pressure, the dearer kind: best CPU us",
+    "law_load_ms": "reading the law's file: best CPU ms",
+    "rod_free_shape_with_law_us": "free shape of four segments at some 200 points, the law's strains included: best CPU us",
     "sphere_max_rel_error": "inflated sphere: largest relative error of the inner radius at P/mu = 0.1 .. 0.8",
     "sphere_past_limit_rel_error": "the same under volume control through the limit point to a = 2.2: largest error of the pressure",
     "tube_max_rel_error": "tube held at its length: largest error of the inner radius at P/mu = 0.1 .. 0.6",
@@ -147,6 +161,9 @@ def snapshot():
         lines.append(f"| {part} | {m['date']} | {m['revision']} | {where} | {m['calibration_seconds']:.3f} |")
     write_text(ROOT / "docs" / "figures.md", "\n".join(lines) + "\n")
     write_text(ROOT / "docs" / "speed.md", speed.page(results, meta))
+    if "law" in meta:
+        page = ROOT / "docs" / "rod-law.md"
+        write_text(page, law.page(page.read_text(), meta["law"]["details"]))
     if "verification" in meta:
         write_text(ROOT / "docs" / "verification.md", verification.page(meta, ROOT / "docs"))
 

@@ -64,9 +64,10 @@ def demo():
     seconds = time.perf_counter() - start
     from design.comparison import Comparison
     from design.rundata import read_run
-    from reduced.model import AnalyticModel
+    from reduced import choose_law
 
-    comparison = Comparison.of(read_run(ROOT / "out" / "demo"), AnalyticModel())
+    designed = read_run(ROOT / "out" / "demo")
+    comparison = Comparison.of(designed, choose_law(designed.law))
     run = json.loads((ROOT / "out" / "demo" / "solve" / "run.json").read_text())
     return {
         "demo_seconds": seconds,

@@ -15,13 +15,13 @@ def tube(points, radius=0.9, colour=TARGET):
     return pyvista.lines_from_points(np.asarray(points, float)).tube(radius=radius), {"color": colour}
 
 
-def body_mesh(manipulator, pressure, model, base_pose):
+def body_mesh(manipulator, pressure, law, base_pose):
     """The reduced model's body (pyvista.PolyData, mm, target coordinates), cell data "segment" 1.. ."""
     import pyvista
 
     from reduced.body import body_surface
 
-    vertices, quads, segments = body_surface(manipulator, pressure, model, base_pose=base_pose)
+    vertices, quads, segments = body_surface(manipulator, pressure, law, base_pose=base_pose)
     mesh = pyvista.PolyData(vertices, np.column_stack([np.full(len(quads), 4), quads]).ravel())
     mesh.cell_data["segment"] = segments + 1
     return mesh

@@ -10,7 +10,7 @@ from base.errors import ConvergenceError
 from base.strains import RodStrains
 from design.labels import plain
 from design.metrics import Errors, compare
-from reduced.model import predict
+from reduced.model import doubts, predict
 
 # what the words of the verdict mean, in % of length (RMS of points paired by arc length)
 CONFIRMS, ROUGHLY = 2.0, 5.0
@@ -36,10 +36,13 @@ class Comparison:
     nearest: tuple | None = None
 
     @classmethod
-    def of(cls, run, model):
-        design, notes = run.design, []
+    def of(cls, run, law):
+        design = run.design
+        doubted = doubts(design.manipulator, design.pressure, law)
+        doubted = doubts(design.manipulator, design.pressure, law)
+        notes = [f"The law '{law.name}' of the reduced model is in doubt: {text}." for text in doubted]
         solved = at_solve = strains = None
-        reduced = _predict(design, design.pressure, model, notes)
+        reduced = _predict(design, design.pressure, law, notes)
         if run.centreline is not None and reduced is not None:
             difference = compare(run.centreline[1], reduced)
             if difference.hausdorff > 1e-3 * difference.reference_length:
@@ -65,9 +68,9 @@ class Comparison:
                     f"{plain(design.pressure * 1e3)} kPa. It is compared with the reduced model at {last}; "
                     "its distance to the target is that of a body not fully inflated."
                 )
-            at_solve = _predict(design, run.solve.pressure, model, notes)
+            at_solve = _predict(design, run.solve.pressure, law, notes)
             if at_solve is not None:
-                each = [model.strains(s, run.solve.pressure) for s in design.manipulator.segments]
+                each = [law.strains(s, run.solve.pressure) for s in design.manipulator.segments]
                 strains = RodStrains([s.e for s in each], [s.k for s in each])
         return cls(
             reduced,
@@ -117,9 +120,9 @@ def stopped_short(run):
     return run.solve is not None and run.solve.pressure < run.design.pressure * (1 - 1e-6)
 
 
-def _predict(design, pressure, model, notes):
+def _predict(design, pressure, law, notes):
     try:
-        return predict(design.manipulator, pressure, model, base_pose=design.base_pose).points
+        return predict(design.manipulator, pressure, law, base_pose=design.base_pose).points
     except ConvergenceError as error:
         notes.append(f"The reduced model has no solution at {plain(pressure * 1e3)} kPa: {error}")
         return None

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from base.errors import ConvergenceError
 from geometry.parameters import TWISTING as TWISTING_KIND
 
 HEIGHT_WEIGHT = 0.1  # rad per mm away from the start height: decides only between equals
+OUTSIDE = 1.0  # rad per width of what the law knows that an entry lies outside of it
 
 
 @dataclass(frozen=True)
@@ -24,32 +24,15 @@ class Guess:
     misfit: float
 
 
-def responses(segment, pressures, law):
-    """Stretch, curvature (1/mm) and twist (rad/mm) per deformed length, (3, m), at pressures (m,) in MPa; nan beyond a
-    limit load."""
-    out = np.full((3, len(pressures)), np.nan)
-    for j, pressure in enumerate(pressures):
-        try:
-            strains = law.strains(segment, float(pressure))
-        except ConvergenceError:
-            break
-        out[:, j] = strains.stretch, strains.frenet_curvature, _twist(segment, strains)
-    return out
-
-
-def _twist(segment, strains):
-    return strains.twist_per_deformed_length if segment.kind == TWISTING_KIND else strains.frenet_torsion
-
-
-def active_length(segment, count):
-    """Undeformed active length, mm, of a real number of chambers: `Segment.active_length` between whole ones."""
-    return count * segment.pitch - segment.gap / segment.sin
+def responses(strains, twisting):
+    """Stretch, curvature (1/mm) and twist (rad/mm) per deformed length, (3, ...), of RodStrains (..., 3)."""
+    twist = strains.twist_per_deformed_length if twisting else strains.frenet_torsion
+    return np.stack([strains.stretch, strains.frenet_curvature, twist])
 
 
 def count_for(segment, stretch, deformed_length):
     """Real number of chambers (>= 1) that makes a segment as long as asked when its active part is stretched."""
-    active = (deformed_length - 2 * segment.end_length) / stretch
-    return max(1.0, (active + segment.gap / segment.sin) / segment.pitch)
+    return max(1.0, (deformed_length - 2 * segment.end_wall) / stretch / segment.pitch)
 
 
 def first_guesses(pieces, prototypes, angles, heights, pressures, law):
@@ -70,17 +53,17 @@ def first_guesses(pieces, prototypes, angles, heights, pressures, law):
 
 def _options(piece, prototype, angles, heights, pressures, law):
     """For every pressure the list of (misfit, segment, count) of one piece."""
+    segments = [replace(prototype, angle=float(a), chamber_height=float(h)) for a in angles for h in heights]
+    found = responses(law.table(segments, pressures), prototype.kind == TWISTING_KIND)
     entries = [[] for _ in pressures]
-    for angle in angles:
-        for height in heights:
-            segment = replace(prototype, angle=float(angle), chamber_height=float(height))
-            for j, (stretch, curvature, twist) in enumerate(responses(segment, pressures, law).T):
-                if not np.isfinite(stretch):
-                    continue
-                count = count_for(segment, stretch, piece.length)
-                active = stretch * active_length(segment, count)
-                turned = active * np.array([curvature, twist])
-                asked = piece.length * np.array([piece.curvature, piece.twist])
-                misfit = np.sum((turned - asked) ** 2) + (HEIGHT_WEIGHT * (height - prototype.chamber_height)) ** 2
-                entries[j].append((misfit, segment, count))
+    asked = piece.length * np.array([piece.curvature, piece.twist])
+    for segment, rows in zip(segments, np.moveaxis(found, 0, -1)):
+        away = (HEIGHT_WEIGHT * (segment.chamber_height - prototype.chamber_height)) ** 2
+        for pressure, options, (stretch, *rates) in zip(pressures, entries, rows):
+            if not np.isfinite(stretch):
+                continue
+            count = count_for(segment, stretch, piece.length)
+            turned = stretch * count * segment.pitch * np.array(rates)
+            outside = np.sum((OUTSIDE * law.excess(segment, pressure)) ** 2)
+            options.append((np.sum((turned - asked) ** 2) + away + outside, segment, count))
     return entries

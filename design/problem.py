@@ -10,11 +10,10 @@ import numpy as np
 
 from base import se3
 from base.errors import ConvergenceError, InputError
-from base.strains import RodStrains
 from design.curves import arc_lengths, evenly, nearest_points
-from design.lookup import active_length
 from reduced.centreline import centreline
 from reduced.clearance import gap_left
+from reduced.ends import free_manipulator
 
 PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)
@@ -22,6 +21,7 @@ PAIRS = 101
 SPACING = 2.0  # mm between the samples of a trial's centreline
 STEP = 1e-5  # of a variable's range, for differences
 TOUCH = 5.0  # mm of misfit per mm that facing walls would overlap: contact is not in the law, so it is not designed into
+OUTSIDE = 20.0  # mm of misfit per width of what the law knows that a segment lies outside of it
 PREFERENCE = 0.02  # mm of misfit per range that a dimension leaves its start by: decides where the target does not
 
 
@@ -44,14 +44,8 @@ class Trial:
 
     def centreline(self, law, base_point):
         """The Centreline from base_point (3,), mm."""
-        lengths, e, k = [], [], []
-        rest = RodStrains.unstrained()
-        for segment, count in zip(self.segments, self.counts):
-            strains = law.strains(segment, self.pressure)
-            lengths += [segment.end_length, active_length(segment, count), segment.end_length]
-            e += [rest.e, strains.e, rest.e]
-            k += [rest.k, strains.k, rest.k]
-        return centreline(lengths, RodStrains(e, k), SPACING, se3.make_pose(self.rotation, base_point))
+        pieces = free_manipulator(self.segments, law.each(self.segments, self.pressure), self.counts)
+        return centreline(*pieces, SPACING, se3.make_pose(self.rotation, base_point))
 
 
 @dataclass(frozen=True)
@@ -81,6 +75,7 @@ class Problem:
         else:
             misfits = [self._paired(line)]
         misfits += [self._unseen_twists(trial), TOUCH * walls_overlap(trial.segments, trial.pressure)]
+        misfits += [OUTSIDE * self.law.excess(segment, trial.pressure) for segment in trial.segments]
         return np.concatenate([m.ravel() for m in misfits])
 
     def _paired(self, line):
@@ -101,7 +96,7 @@ class Problem:
         misfits = [0.0]
         for piece, segment, count in zip(self.pieces, trial.segments, trial.counts):
             if not piece.twist_seen:
-                turned = self.law.strains(segment, trial.pressure).k[0] * active_length(segment, count)
+                turned = self.law.strains(segment, trial.pressure).k[0] * count * segment.pitch
                 misfits.append(segment.width / 2 * (turned - piece.twist * piece.length))
         return np.array(misfits)
 

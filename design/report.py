@@ -13,7 +13,7 @@ from design.comparison import CONFIRMS, ROUGHLY, Comparison, overlaps, stopped_s
 from design.drawing import draw_drawing, segment_table
 from design.labels import plain, segment_name, significant
 from design.rundata import read_run
-from reduced.model import AnalyticModel
+from reduced.choice import choose_law
 
 STYLE = """
 :root { color-scheme: light; }
@@ -52,21 +52,22 @@ footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
 """
 
 
-def write_report(directory, say=print, model=None):
+def write_report(directory, say=print, law=None):
     """Write directory/report.html and its pictures in directory/report/; returns the path of the page.
 
-    Shows what is there: without a mesh or a finite element solution it says so. InputError without design.toml.
+    law: a SegmentLaw, by default the one that the folder was designed with. Shows what is there: without a mesh or a finite
+    element solution it says so. InputError without design.toml.
     """
     run = read_run(directory)
-    model = model or AnalyticModel()
+    law = choose_law(run.law) if law is None else law
     folder = output_directory(run.directory / "report")
-    comparison = Comparison.of(run, model)
+    comparison = Comparison.of(run, law)
     draw_drawing(run.design, folder / "drawing.png")
     sections = [
-        ("Target, prediction, finite elements", _shapes(run, comparison, model, folder)),
+        ("Target, prediction, finite elements", _shapes(run, comparison, law, folder)),
         ("Errors", _errors(comparison, run)),
         ("Strains of the segments", _strains(run, comparison)),
-        ("Load history", _history(run, model, folder)),
+        ("Load history", _history(run, law, folder)),
         ("Where walls touch", _walls(run, folder)),
         ("Drawing, dimensions, material", _drawing(run, folder)),
         ("How it was computed", _computed(run)),
@@ -141,14 +142,14 @@ def _alarms(run):
     return "".join(f'<p class="alarm">OVERLAP, not proven: {escape(text)}.</p>' for text in overlaps(run))
 
 
-def _shapes(run, comparison, model, folder):
+def _shapes(run, comparison, law, folder):
     out = ""
     if run.solve is None:
         out += _missing("There is no finite element solution in this folder yet (pneunet solve).")
     elif run.solve.solution is None:
         out += _missing("The finite element fields (solve/solution.pvd) are not in this folder.")
     curves = figures.curve_picture(run, comparison, folder)
-    bodies = figures.body_pictures(run, comparison, model, folder)
+    bodies = figures.body_pictures(run, comparison, law, folder)
     fields = [b for b in bodies if b[0] in ("fe_displacement.png", "fe_stretch.png", "reference.png")]
     beside = [b for b in bodies if b not in fields]
     return (
@@ -220,10 +221,10 @@ def _fixed(value, digits):
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def _history(run, model, folder):
+def _history(run, law, folder):
     if run.solve is None:
         return _missing("No finite element solution yet.")
-    return "".join(_image(folder, *p) for p in figures.history_picture(run, model, folder))
+    return "".join(_image(folder, *p) for p in figures.history_picture(run, law, folder))
 
 
 def _walls(run, folder):

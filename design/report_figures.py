@@ -52,15 +52,15 @@ def curve_picture(run, comparison, folder):
     ]
 
 
-def body_pictures(run, comparison, model, folder):
+def body_pictures(run, comparison, law, folder):
     """Target, reduced body, finite element body and the reference body from one camera at one scale; fields on the
     finite element body."""
     design = run.design
     pressure = run.solve.pressure if run.solve else design.pressure
     reduced = None
     if (comparison.reduced_at_solve if run.solve else comparison.reduced) is not None:
-        reduced = bodies.body_mesh(design.manipulator, pressure, model, design.base_pose)
-    rest = bodies.body_mesh(design.manipulator, 0.0, model, design.base_pose)
+        reduced = bodies.body_mesh(design.manipulator, pressure, law, design.base_pose)
+    rest = bodies.body_mesh(design.manipulator, 0.0, law, design.base_pose)
     solved = None
     if run.solve is not None and run.solve.solution is not None:
         solved, solved_edges = bodies.deformed_surface(bodies.read_solution(run.solve.solution), design.base_pose)
@@ -123,7 +123,7 @@ def body_pictures(run, comparison, model, folder):
     return out
 
 
-def history_picture(run, model, folder):
+def history_picture(run, law, folder):
     """Tip, volume, wall distance and stretch against pressure; the reduced tip dashed."""
     steps, design = run.solve.steps, run.design
     p = steps["pressure_kPa"]
@@ -132,7 +132,7 @@ def history_picture(run, model, folder):
     tips = []
     for level in np.linspace(0, p.max(), 15):
         try:
-            tips.append((level, *predict(design.manipulator, level * 1e-3, model).points[-1]))
+            tips.append((level, *predict(design.manipulator, level * 1e-3, law).points[-1]))
         except ConvergenceError:
             break
     tips = np.array(tips)

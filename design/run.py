@@ -9,6 +9,7 @@ import scipy
 from base.errors import InputError
 from base.files import output_directory, require_writable, write_csv
 from base.record import write_record
+from design.doubts import WARN, told_doubts
 from design.extraction import extract
 from design.inverse import solve
 from design.metrics import compare
@@ -18,22 +19,24 @@ from design.targetfile import POINT_COLUMNS, read_target
 from design.targets import HELICAL, TWISTING
 from geometry.designfile import Design, write_design
 from geometry.parameters import TWISTING as TWISTING_KIND
-from reduced.model import AnalyticModel, predict
+from reduced.choice import choose_law
+from reduced.model import predict
 
 GIVEN_NOTE = "split given by the user"
 
 
-def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
+def run_design(target_path, directory, law=None, objective=PAIRED, say=print, outside=WARN):
     """Design a manipulator for the target in a CSV or TOML file; returns the `Design`.
 
-    law: a SegmentLaw, by default the AnalyticModel. objective: 'paired' or 'eq27' (see docs/use-design.md). Writes
-    design.toml, target.csv, centreline.csv, design.png and run.json in `directory`, all of them once the design is
-    found. InputError before anything is written; ConvergenceError where the law has no answer.
+    law: a SegmentLaw, by default the trained one that comes along. objective: 'paired' or 'eq27' (see docs/use-design.md).
+    outside: 'warn' or 'refuse' a design that the law doubts. Writes design.toml, target.csv, centreline.csv, design.png and
+    run.json in `directory`, all of them once the design is found. InputError before anything is written; ConvergenceError
+    where the law has no answer.
     """
     started = time.perf_counter()
     if objective not in OBJECTIVES:
         raise InputError(f"objective = '{objective}' is not known: write {' or '.join(OBJECTIVES)}")
-    law = AnalyticModel() if law is None else law
+    law = choose_law() if law is None else law
     target = read_target(target_path)
     require_writable(directory)
     pieces, note = (target.pieces, GIVEN_NOTE) if target.pieces else (split(target.points), NOTE)
@@ -42,6 +45,7 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
     for i, piece in enumerate(wanted, start=1):
         say(f"  piece {i}: {describe(piece)}")
     solution = solve(target, wanted, law, objective, say)
+    doubted = told_doubts(solution.manipulator, solution.pressure, law, outside, say)
 
     line = predict(solution.manipulator, solution.pressure, law, 1.0, solution.base_pose)
     errors = compare(line.points, target.points)
@@ -49,6 +53,7 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
         "split": note,
         "objective": objective,
         "law": law.name,
+        "doubts": list(doubted),
         "active_bounds": list(solution.active),
         "grown_ranges": list(solution.grown),
         "target_error": errors.table(),
@@ -76,6 +81,7 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print):
         versions={"numpy": np.__version__, "scipy": scipy.__version__},
         wall_seconds=round(seconds, 2),
         evaluations=solution.evaluations,
+        doubts=list(doubted),
     )
     for text in summary(design, solution, errors, seconds):
         say(text)

@@ -10,6 +10,7 @@ from base.errors import InputError
 from base.files import read_columns, read_csv
 from base.strains import RodStrains
 from geometry.designfile import Design, body_tables, read_design
+from reduced.choice import TRAINED
 
 POINTS = ["x_mm", "y_mm", "z_mm"]
 STEP_COLUMNS = [
@@ -80,6 +81,11 @@ class Run:
     mesh: dict
     solve: Solve | None
     stale: bool = False
+
+    @property
+    def law(self):
+        """Name of the law that `pneunet design` took."""
+        return self.record.get("inputs", {}).get("law", TRAINED)
 
 
 def read_run(directory):

@@ -7,19 +7,23 @@ import numpy as np
 from base.errors import ConvergenceError, InputError
 from base.files import atomic_path, output_directory, write_csv
 from base.record import write_record
+from design.doubts import WARN, told_doubts
 from design.labels import plain
 from geometry.designfile import read_design
-from reduced.model import AnalyticModel, predict
+from reduced.choice import choose_law
+from reduced.model import predict
 
 FRAMES = 24
 FRAME_PIXELS = (540, 432)
 
 
-def run_shape(design_path, pressures, directory, say=print, model=None):
-    """Shapes of a design at `pressures` (MPa), written to directory/shape.
+def run_shape(design_path, pressures, directory, say=print, law=None, outside=WARN):
+    """Shapes of a design at `pressures` (MPa) by a SegmentLaw, written to directory/shape; by default the trained one that comes along.
+
+    outside: 'warn' or 'refuse' where the law doubts the design at one of the pressures.
 
     centrelines.csv (pressure_kPa, s_mm, x_mm, y_mm, z_mm in target coordinates), body_<pressure>kPa.vtp, bodies.png,
-    inflation.gif, run.json. Pressures beyond the model's limit: the others are written, then ConvergenceError names
+    inflation.gif, run.json. Pressures beyond the law's limit: the others are written, then ConvergenceError names
     what is there. Returns the folder.
     """
     if not pressures:
@@ -28,12 +32,13 @@ def run_shape(design_path, pressures, directory, say=print, model=None):
         if not (np.isfinite(p) and 0 <= p <= 2.0):
             raise InputError(f"--pressure-kPa: {p * 1e3:g} is outside 0..2000 kPa")
     design = read_design(design_path)
+    law = choose_law() if law is None else law
+    doubted = told_doubts(design.manipulator, pressures, law, outside, say)
     folder = output_directory(Path(directory) / "shape")
-    model = model or AnalyticModel()
     shapes, failed = {}, {}
     for p in sorted(set(pressures)):
         try:
-            shapes[p] = predict(design.manipulator, p, model, base_pose=design.base_pose)
+            shapes[p] = predict(design.manipulator, p, law, base_pose=design.base_pose)
         except ConvergenceError as error:
             failed[p] = str(error)
     if not shapes:
@@ -48,13 +53,14 @@ def run_shape(design_path, pressures, directory, say=print, model=None):
         tip = line.points[-1]
         say(f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm")
     try:
-        _pictures(design, shapes, model, folder, say)
+        _pictures(design, shapes, law, folder, say)
     except ImportError as error:
         say(f"no pictures: {error}; install them with: pip install 'pneunet[pictures]'")
     write_record(
         folder,
         design=str(design_path),
-        model=model.name,
+        law=law.name,
+        doubts=list(doubted),
         pressures_kPa=[p * 1e3 for p in shapes],
         failed_kPa={plain(p * 1e3): why for p, why in failed.items()},
     )
@@ -68,11 +74,11 @@ def _list(pressures):
     return ", ".join(plain(p * 1e3) for p in pressures)
 
 
-def _pictures(design, shapes, model, folder, say):
+def _pictures(design, shapes, law, folder, say):
     from base.rendering import view_of
     from design.bodies import body_mesh
 
-    bodies = {p: body_mesh(design.manipulator, p, model, design.base_pose) for p in shapes}
+    bodies = {p: body_mesh(design.manipulator, p, law, design.base_pose) for p in shapes}
     for p, body in bodies.items():
         with atomic_path(folder / f"body_{plain(p * 1e3)}kPa.vtp") as temporary:
             body.save(temporary)
@@ -80,7 +86,7 @@ def _pictures(design, shapes, model, folder, say):
     say(f"bodies at every pressure: {folder / 'bodies.png'}")
     highest = max(shapes)
     if highest > 0:
-        _animation(design, highest, model, folder / "inflation.gif")
+        _animation(design, highest, law, folder / "inflation.gif")
         say(f"inflation from 0 to {plain(highest * 1e3)} kPa: {folder / 'inflation.gif'}")
 
 
@@ -113,7 +119,7 @@ def _picture_of_all(design, view, bodies, path):
     save(fig, path, dpi=90)
 
 
-def _animation(design, highest, model, path):
+def _animation(design, highest, law, path):
     """A GIF that inflates to `highest` (MPa) and holds; 24 frames of a few kB each."""
     from PIL import Image, ImageDraw
 
@@ -121,7 +127,7 @@ def _animation(design, highest, model, path):
     from design.bodies import body_mesh, painted
 
     pressures = highest * np.linspace(0, 1, FRAMES)
-    bodies = [body_mesh(design.manipulator, p, model, design.base_pose) for p in pressures]
+    bodies = [body_mesh(design.manipulator, p, law, design.base_pose) for p in pressures]
     view = view_of(np.vstack([body.points for body in bodies]))
     frames = []
     for p, body in zip(pressures, bodies):

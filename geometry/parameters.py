@@ -231,14 +231,6 @@ class Manipulator:
         return np.concatenate([[0.0], np.cumsum([s.length for s in self.segments])[:-1]])
 
     @property
-    def pieces(self):
-        """(segment index or None if passive, length in mm) from base to tip: what a rod model sees."""
-        out = []
-        for i, s in enumerate(self.segments):
-            out += [(None, s.end_length), (i, s.active_length), (None, s.end_length)]
-        return out
-
-    @property
     def materials(self):
         """Every material of the body once, layers included."""
         return tuple(dict.fromkeys(m for s in self.segments for m in (s.material, s.layer_material) if m is not None))

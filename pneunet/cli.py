@@ -76,8 +76,17 @@ def parser():
         command.set_defaults(function=function)
         return command
 
+    def add_law(command, default):
+        text = f"trained (the rod law that comes along), analytic, or the .npz of pneunet train; default: {default or 'as designed'}"
+        command.add_argument("--law", default=default, metavar="LAW", help=text)
+
+    def add_outside(command):
+        command.add_argument("--outside", choices=("warn", "refuse"), default="warn", help="where the law doubts the design; default: warn")
+
     c = add("design", run_design, "inverse design: target curve (CSV or TOML) -> design.toml, centreline.csv, design.png")
     c.add_argument("target", type=Path)
+    add_law(c, "trained")
+    add_outside(c)
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the target")
 
     c = add("shape", run_shape, "reduced model only: centrelines, 3D body, picture and animation")
@@ -89,6 +98,8 @@ def parser():
         metavar="10,20,...",
         help="default: five steps to the design's",
     )
+    add_law(c, "trained")
+    add_outside(c)
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
 
     c = add("mesh", run_mesh, "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
@@ -127,6 +138,7 @@ def parser():
 
     c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
     c.add_argument("directory", type=Path)
+    add_law(c, None)
 
     c = add("fit-material", run_fit_material, "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
     c.add_argument("test", type=Path, metavar="TENSILE.csv")
@@ -153,16 +165,18 @@ def design_folder(arguments):
 
 def run_design(a):
     from design.run import run_design as work
+    from reduced.choice import choose_law
 
-    work(a.target, a.output or Path("out") / a.target.stem, say=say)
+    work(a.target, a.output or Path("out") / a.target.stem, choose_law(a.law), say=say, outside=a.outside)
 
 
 def run_shape(a):
     from design.shape import run_shape as work
     from geometry.designfile import read_design
+    from reduced.choice import choose_law
 
     top = read_design(a.design).pressure
-    work(a.design, a.pressures or [top * i / 5 for i in range(1, 6)], design_folder(a), say=say)
+    work(a.design, a.pressures or [top * i / 5 for i in range(1, 6)], design_folder(a), say, choose_law(a.law), a.outside)
 
 
 def run_mesh(a):
@@ -213,8 +227,9 @@ def run_train(a):
 
 def run_report(a):
     from design.report import write_report
+    from reduced.choice import choose_law
 
-    write_report(a.directory, say=say)
+    write_report(a.directory, say, choose_law(a.law) if a.law else None)
 
 
 def run_fit_material(a):

@@ -2,7 +2,8 @@
 
 from reduced.body import body_surface
 from reduced.centreline import Centreline, centreline, free_shapes
-from reduced.model import AnalyticModel, SegmentLaw, predict
+from reduced.choice import choose_law, shipped_law
+from reduced.model import AnalyticModel, SegmentLaw, doubts, predict
 from reduced.rod import Piece, Rod
 from reduced.section_laws import QuadraticLaw, RodLaw
 
@@ -16,6 +17,9 @@ __all__ = [
     "SegmentLaw",
     "body_surface",
     "centreline",
+    "choose_law",
+    "doubts",
     "free_shapes",
     "predict",
+    "shipped_law",
 ]

@@ -54,15 +54,15 @@ def segment_outline(segment, spacing=1.0):
     return np.concatenate(vertices), np.concatenate(all_quads)
 
 
-def body_surface(manipulator, pressure, model=None, spacing=1.0, base_pose=None):
-    """The deformed outline of a manipulator at `pressure` (MPa) by a SegmentLaw (default: the AnalyticModel).
+def body_surface(manipulator, pressure, law, spacing=1.0, base_pose=None):
+    """The deformed outline of a manipulator at `pressure` (MPa) by a SegmentLaw.
 
     Returns vertices (n, 3) in mm, quads (m, 4) of vertex numbers, and the segment's index of each quad (m,). spacing:
     edge length along the body, mm; base_pose (4, 4) as in `predict`.
     """
     if not spacing > 0:
         raise InputError(f"spacing = {spacing:g} mm must be larger than 0")
-    line = predict(manipulator, pressure, model, spacing, base_pose)
+    line = predict(manipulator, pressure, law, spacing, base_pose)
     stretch = line.strains.stretch
     vertices, quads, owner, count = [], [], [], 0
     for i, (segment, start) in enumerate(zip(manipulator.segments, manipulator.starts)):

@@ -19,6 +19,8 @@ TREND = 100.0
 LOG_NOISE = (np.log(1e-6), np.log(1e-1))
 LOG_SCALE = (np.log(0.3), np.log(100.0))
 JITTER = 1e-9
+#: evaluated at once: what fits into a core's cache
+ROWS = 256
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,13 @@ class GaussianProcess:
 
     def __call__(self, x, derivative=False):
         """(n, p) at inputs (n, d); with `derivative` also (n, p, d)."""
+        if len(x) > ROWS:
+            parts = [self(x[i : i + ROWS], derivative) for i in range(0, len(x), ROWS)]
+            return tuple(map(np.concatenate, zip(*parts))) if derivative else np.concatenate(parts)
         z = (x - self.shift) / self.width
         a, m = z / self.scales, len(self.points)
-        kernel, (smooth, constant, slopes) = _kernel(a, self.points), np.split(self.weights, [m, m + 1])
+        smooth, constant, slopes = self.weights[:m], self.weights[m], self.weights[m + 1 :]
+        kernel = _kernel(a, self.points)
         curved = kernel @ smooth
         mean = curved + constant + z @ slopes
         if not derivative:
@@ -69,9 +75,34 @@ class GaussianProcess:
         return np.sqrt((known + np.maximum(missed, 0))[:, None] * self.variance)
 
 
+@dataclass(frozen=True)
+class SideBySide:
+    """Gaussian processes of consecutive outputs, each with scales and noise of its own, as one."""
+
+    processes: tuple
+
+    def __call__(self, x, derivative=False):
+        found = [process(x, derivative) for process in self.processes]
+        if not derivative:
+            return np.concatenate(found, axis=1)
+        return tuple(np.concatenate(part, axis=1) for part in zip(*found))
+
+    def deviation(self, x):
+        return np.concatenate([process.deviation(x) for process in self.processes], axis=1)
+
+
+def fit_side_by_side(x, y, group, trust, widths, like=None):
+    """SideBySide processes of `widths` outputs each; the rest as for `fit`."""
+    ends = np.cumsum([0, *widths])
+    likes = like.processes if like else [None] * len(widths)
+    return SideBySide(tuple(fit(x, y[:, a:b], group, trust[:, a:b], like=known) for a, b, known in zip(ends, ends[1:], likes)))
+
+
 def _kernel(a, b):
-    squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
-    return np.exp(-0.5 * np.maximum(squares, 0))
+    k = a @ b.T
+    k -= (a * a).sum(axis=1)[:, None] / 2
+    k -= (b * b).sum(axis=1) / 2
+    return np.exp(np.minimum(k, 0, out=k), out=k)
 
 
 def fit(x, y, group, trust=None, most=500, inducing=1000, seed=0, like=None):

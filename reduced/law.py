@@ -6,7 +6,7 @@ free_strains(P), psi(q, P), force(q, P), stiffness(q, P). Everything else is wit
 """
 
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from base.materials import NeoHookean
 from base.strains import RodStrains
 from geometry.parameters import TWISTING
 from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
-from reduced.gaussian import GaussianProcess
+from reduced.gaussian import GaussianProcess, SideBySide
 from reduced.law_coordinates import LENGTHS, Coordinates, cosine
+from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, whitening
 
 SCHEMA = "pneunet-law-1"
@@ -29,13 +30,13 @@ LOWEST = 1e-9
 
 @dataclass(frozen=True)
 class KindLaw:
-    """The law of one kind. strains, stiffness: GaussianProcess of Coordinates; quantile (6,): what a standard deviation of each
+    """The law of one kind. strains, stiffness: processes of Coordinates; quantile (6,): what a standard deviation of each
     strain is multiplied by for a 90 % interval; low, high (d,): range of the inputs; doubt: largest deviation of the leading
     strain that counts as known; level: the mesh that is predicted, by its place among those trained on, the finest last."""
 
     kind: str
-    strains: GaussianProcess
-    stiffness: GaussianProcess
+    strains: SideBySide
+    stiffness: SideBySide
     anharmonic: Anharmonic
     quantile: np.ndarray
     low: np.ndarray
@@ -43,7 +44,7 @@ class KindLaw:
     doubt: float
     level: int = 0
 
-    @property
+    @cached_property
     def coordinates(self):
         return Coordinates(self.kind)
 
@@ -65,8 +66,12 @@ class KindLaw:
 
     def free_stiffness(self, shape, pressure):
         """(n, 6, 6) tangent stiffness of the free states."""
+        return self.stiffness_at(shape, self.free_strains(shape, pressure))
+
+    def stiffness_at(self, shape, strains):
+        """(n, 6, 6) the same, of free states with these strains (n, 6)."""
         co = self.coordinates
-        return co.stiffness(shape, self.stiffness(self._inputs(shape, pressure)))
+        return co.stiffness(shape, self.stiffness(co.stiffness_inputs(shape, strains, self.level)))
 
     def half_width(self, shape, pressure):
         """(n, 6) half of the 90 % interval of each free strain."""
@@ -79,31 +84,62 @@ class KindLaw:
         x = self._inputs(shape, pressure)
         return co.spread(shape, pressure, self.strains(x), self.strains.deviation(x))
 
-    def outside(self, shape, pressure):
-        """(n,) bool: where the law has not been taught."""
+    def excess(self, shape, pressure):
+        """(n, d + 1) how far a design lies outside what the law was taught: of each input in widths of its range, and of the leading
+        strain's deviation in units of the largest that counts as known; 0 inside."""
         x = self._inputs(shape, np.maximum(pressure, LOWEST))
-        box = ((x < self.low - 1e-9) | (x > self.high + 1e-9)).any(axis=1)
-        return box | (self.strains.deviation(x)[:, 0] > self.doubt)
+        width = np.maximum(self.high - self.low, 1.0)  # a level's may be 0
+        box = np.maximum(np.maximum(self.low - x, x - self.high) - 1e-9, 0) / width
+        return np.column_stack([box, np.maximum(self.strains.deviation(x)[:, 0] / self.doubt - 1, 0)])
 
 
-@dataclass(frozen=True)
-class RodLaw:
+@dataclass(frozen=True, eq=False)
+class RodLaw(SegmentLaw):
     """kinds: {kind: KindLaw}; about: how it was trained."""
 
     kinds: dict
     about: dict
-    name = "trained"
+    name: str = "trained"
+
+    def _kind(self, segment):
+        if segment.kind not in self.kinds:
+            known = " and ".join(self.kinds)
+            raise InputError(f"kind = '{segment.kind}': the law '{self.name}' knows {known} segments only: take --law analytic")
+        return self.kinds[segment.kind]
 
     def of(self, segment):
         """The SectionLaw of a Segment; InputError for a kind that it was not taught."""
-        if segment.kind not in self.kinds:
-            raise InputError(f"kind = '{segment.kind}': this law was trained on {', '.join(self.kinds)} segments only")
-        return SectionLaw(self.kinds[segment.kind], shape_numbers(segment), normal_pitch(segment), segment.material.mu, _ties(segment))
+        return SectionLaw(self._kind(segment), shape_numbers(segment), normal_pitch(segment), segment.material.mu, _ties(segment))
 
     def strains(self, segment, pressure):
-        """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa (a reduced.model.SegmentLaw)."""
-        q = self.of(segment).free_strains(np.asarray(pressure, float))
+        """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa, a number or an array."""
+        q = self.of(segment).free_strains(checked_pressure(pressure))
         return RodStrains(q[..., :3], q[..., 3:])
+
+    def table(self, segments, pressures):
+        """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
+        q, pressures = np.empty((len(segments), len(pressures), 6)), checked_pressure(pressures)
+        for kind in {s.kind for s in segments}:
+            rows = [i for i, s in enumerate(segments) if s.kind == kind]
+            chosen = [segments[i] for i in rows]
+            shape = np.repeat([shape_numbers(s) for s in chosen], len(pressures), axis=0)
+            P = np.concatenate([pressures / s.material.mu for s in chosen])
+            q[rows] = self._kind(chosen[0]).free_strains(shape, P).reshape(len(rows), -1, 6)
+        q[..., 3:] /= np.array([normal_pitch(s) for s in segments])[:, None, None]
+        return RodStrains(q[..., :3], q[..., 3:])
+
+    def each(self, segments, pressure):
+        """RodStrains (n, 3) of n segments at one pressure in MPa, all at once."""
+        found = self.table(segments, [pressure])
+        return RodStrains(found.e[:, 0], found.k[:, 0])
+
+    def excess(self, segment, pressure):
+        """(d,) how far a segment at a pressure (MPa) lies outside what the law was taught; KindLaw.excess."""
+        return self._kind(segment).excess(shape_numbers(segment)[None], np.array([pressure / segment.material.mu]))[0]
+
+    def doubts(self, segment, pressure):
+        """Reasons, as text, not to trust the law for a segment at a pressure (MPa) or several; () when there are none."""
+        return self.of(segment).doubts(pressure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +159,8 @@ class SectionLaw:
     def _free_state(self, *pressures):
         """(free strains (n, 6), M (n, 6, 6), D1 (n,)) without dimension at pressures in MPa."""
         shape, p = self._rows(pressures)
-        return self.law.free_strains(shape, p), *whitening(self.law.kind, self.law.free_stiffness(shape, p))
+        free = self.law.free_strains(shape, p)
+        return free, *whitening(self.law.kind, self.law.stiffness_at(shape, free))
 
     def _rows(self, P):
         p = np.atleast_1d(np.asarray(P, float)).ravel() / self.mu
@@ -139,8 +176,19 @@ class SectionLaw:
 
     def doubts(self, P):
         """Reasons, as text, not to trust the law at this pressure; () when there are none."""
-        outside = self.law.outside(*self._rows(P)).any()
-        return self.remarks + (("design or pressure lies outside the data that the law was trained on",) if outside else ())
+        shape, p = self._rows(P)
+        law, co = self.law, self.law.coordinates
+        excess = law.excess(shape, p)
+        told = co.told(law._inputs(shape, p)[excess.max(axis=1).argmax()])
+        known = np.sort([co.told(law.low), co.told(law.high)], axis=0).T
+        reasons = [
+            f"{name} = {value:.3g} is outside the trained law's {low:.3g} to {high:.3g}"
+            for name, value, (low, high), out in zip(co.names, told, known, excess.max(axis=0) > 0)
+            if out
+        ]
+        if excess[:, -1].max() > 0 and not reasons:
+            reasons = ["the trained law knows no design near this one"]
+        return self.remarks + tuple(reasons)
 
     def _state(self, q, P):
         """(shape of the answer, v (n, 6), M (n, 6, 6), D1 (n,), c (n,))."""
@@ -201,21 +249,22 @@ def write_law(path, law):
     arrays = {}
     for kind, k in law.kinds.items():
         for name in ("strains", "stiffness"):
-            for f in fields(GaussianProcess):
-                value = np.asarray(getattr(getattr(k, name), f.name))
-                if f.name == "root":  # of the stiffness nobody asks the deviation
-                    value = value[np.triu_indices(len(value))].astype("f4")[: 0 if name == "stiffness" else None]
-                arrays[f"{kind}/{name}/{f.name}"] = value
+            for number, process in enumerate(getattr(k, name).processes):
+                for f in fields(GaussianProcess):
+                    value = np.asarray(getattr(process, f.name))
+                    if f.name == "root":  # of the stiffness nobody asks the deviation
+                        value = value[np.triu_indices(len(value))].astype("f4")[: 0 if name == "stiffness" else None]
+                    arrays[f"{kind}/{name}/{number}/{f.name}"] = value
         arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
         arrays |= {f"{kind}/coefficients": k.anharmonic.coefficients, f"{kind}/reach": np.asarray(k.anharmonic.reach)}
-    about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": LENGTHS, **law.about}
+    about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": {k: list(v) for k, v in LENGTHS.items()}, **law.about}
     write_archive(path, SCHEMA, about, arrays)
 
 
-def read_law(path):
-    """The RodLaw in a file; InputError when it is none or of another version."""
+def read_law(path, name=None):
+    """The RodLaw in a file, by default named like it; InputError when it is none or of another version."""
     with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, stored):
-        return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about)
+        return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about, name or str(path))
 
 
 def _triangle(flat):
@@ -229,9 +278,13 @@ def _triangle(flat):
 def _read_kind(stored, kind):
     processes = {}
     for name in ("strains", "stiffness"):
-        values = {f.name: stored[f"{kind}/{name}/{f.name}"] for f in fields(GaussianProcess)}
-        values |= {name: float(values[name]) for name in ("noise", "common_noise")} | {"root": _triangle(values["root"])}
-        processes[name] = GaussianProcess(**values)
+        processes[name], number = [], 0
+        while f"{kind}/{name}/{number}/noise" in stored:
+            values = {f.name: stored[f"{kind}/{name}/{number}/{f.name}"] for f in fields(GaussianProcess)}
+            values |= {one: float(values[one]) for one in ("noise", "common_noise")} | {"root": _triangle(values["root"])}
+            processes[name].append(GaussianProcess(**values))
+            number += 1
+    processes = {name: SideBySide(tuple(found)) for name, found in processes.items()}
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, stored[f"{kind}/coefficients"], float(stored[f"{kind}/reach"]))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])

@@ -9,6 +9,7 @@ blocks that the half turns of the body leave: unit lower triangular L and log D.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,14 +21,23 @@ MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 REST = np.eye(6)[0]
 #: P/mu below which the response is linear anyway: the logarithm is taken of their sum
 SMALL_PRESSURE = 0.01
-#: Segment's lengths that the sample varies on their own
-LENGTHS = {
-    ONE_SIDED: ("width", "chamber_height", "cavity_thickness", "wall", "top_wall", "base_thickness", "channel_width", "channel_height"),
-    TWISTING: (
-        *("width", "chamber_height", "cavity_thickness", "wall", "top_wall", "roof", "channel_width", "channel_height"),
-        "cavity_floor",
-    ),
+#: what loads a cell and what holds it: kind -> name -> sum of Segment's lengths; as many as the sample varies on their own.
+#: (Measured: a tenth off the error of the free strains against the lengths themselves.)
+_OF_BOTH = {
+    "width": {"width": 1},
+    "cavity's rise over the core": {"cavity_floor": 1, "chamber_height": 1, "channel_height": -0.5, "roof": -1},
+    "cavity_thickness": {"cavity_thickness": 1},
+    "wall": {"wall": 1},
+    "top_wall": {"top_wall": 1},
+    "channel_width": {"channel_width": 1},
+    "channel_height": {"channel_height": 1},
 }
+LENGTHS = {
+    ONE_SIDED: _OF_BOTH | {"core's height": {"base_thickness": 1, "channel_height": 1, "roof": 1}},
+    TWISTING: _OF_BOTH | {"core's half height": {"channel_height": 0.5, "roof": 1}, "cavity_floor": {"cavity_floor": 1}},
+}
+#: of a normal pitch; lengths that are smaller, or negative, count as this
+SMALLEST = 1e-3
 #: kind -> (index of the leading strain, of the others that are not zero)
 LEADING = {ONE_SIDED: (4, (0, 1, 3)), TWISTING: (0, (3,))}
 #: kind -> blocks of the stiffness
@@ -42,10 +52,41 @@ class Coordinates:
 
     def inputs(self, shape, pressure, level):
         """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a number."""
-        columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
-        return np.column_stack(
-            [cosine(shape) ** 2, np.log(shape[:, columns]), np.log(pressure + SMALL_PRESSURE), np.broadcast_to(level, len(shape))]
-        )
+        x = np.empty((len(shape), len(LENGTHS[self.kind]) + 3))
+        x[:, 0], x[:, -2], x[:, -1] = cosine(shape) ** 2, np.log(pressure + SMALL_PRESSURE), level
+        np.log(self._lengths(shape), out=x[:, 1:-2])
+        return x
+
+    def stiffness_inputs(self, shape, strains, level):
+        """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place of the pressure. (What
+        softens a cell is how far it has gone; measured: a fifth off the error.)"""
+        x = self.inputs(shape, np.zeros(len(shape)), level)
+        lead = LEADING[self.kind][0]
+        x[:, -2] = strains[:, lead] - REST[lead]
+        return x
+
+    @cached_property
+    def _sums(self):
+        """(13, d) from shape numbers to LENGTHS."""
+        out = np.zeros((len(SHAPE), len(LENGTHS[self.kind])))
+        for i, parts in enumerate(LENGTHS[self.kind].values()):
+            for name, factor in parts.items():
+                out[SHAPE.index(name), i] = factor
+        return out
+
+    def _lengths(self, shape):
+        return np.maximum(shape @ self._sums, SMALLEST)
+
+    @property
+    def names(self):
+        """What `told` gives."""
+        lengths = [f"{name} / normal pitch" for name in LENGTHS[self.kind]]
+        return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh"]
+
+    def told(self, inputs):
+        """(d,) inputs (d,) as a user knows them: degrees, ratios."""
+        angle = np.degrees(np.arccos(np.sqrt(inputs[0])))
+        return np.array([angle, *np.exp(inputs[1:-2]), max(np.exp(inputs[-2]) - SMALL_PRESSURE, 0.0), inputs[-1]])
 
     # ---- free strains
     @property
@@ -84,10 +125,9 @@ class Coordinates:
         lead, others = LEADING[self.kind]
         n, c = len(learned), cosine(shape)
         by_angle = -np.radians(1.0) * np.sin(np.radians(shape[:, 0]))  # dc/d(degree)
-        columns = [SHAPE.index(name) for name in LENGTHS[self.kind]]
         by = np.zeros((n, learned.shape[1], len(SHAPE) + 1))
+        by[:, :, :-1] = (slopes[:, :, 1:-2] / self._lengths(shape)[:, None]) @ self._sums.T
         by[:, :, 0] = slopes[:, :, 0] * (2 * c * by_angle)[:, None]
-        by[:, :, columns] = slopes[:, :, 1:-2] / shape[:, None, columns]
         by[:, :, -1] = slopes[:, :, -2] / (pressure + SMALL_PRESSURE)[:, None]
         size = np.exp(learned[:, 0]) * pressure
         by_size = size[:, None] * by[:, 0]

@@ -1,29 +1,62 @@
-"""From segments to shapes: the analytic law of a segment, and the prediction of a manipulator."""
+"""From segments to shapes: what a law of a segment is, the analytic one, and the prediction of a manipulator."""
 
+from abc import ABC, abstractmethod
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 
-from base.errors import InputError
+from base.errors import ConvergenceError, InputError
 from base.strains import RodStrains
 from geometry.parameters import TWISTING
 from reduced.centreline import centreline
+from reduced.ends import free_manipulator
 from reduced.helical import HelicalCell
 from reduced.section import equivalent_radii
 from reduced.twisting import TwistingTube
 
 
-class SegmentLaw(Protocol):
-    """What predicts the free strains of the middle of a long segment."""
+class SegmentLaw(ABC):
+    """What predicts the free strains of the middle of a long segment; `name`: what --law calls it."""
 
-    name: str
-
+    @abstractmethod
     def strains(self, segment, pressure):
         """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa, a number or an array."""
 
+    def each(self, segments, pressure):
+        """RodStrains (n, 3) of n segments at one pressure in MPa."""
+        found = [self.strains(s, float(pressure)) for s in segments]
+        return RodStrains([q.e for q in found], [q.k for q in found])
 
-class AnalyticModel:
+    def table(self, segments, pressures):
+        """RodStrains (n, m, 3) of n segments at increasing pressures (m,) in MPa; nan from where there is no equilibrium."""
+        e, k = np.full((2, len(segments), len(pressures), 3), np.nan)
+        for i, segment in enumerate(segments):
+            for j, pressure in enumerate(pressures):
+                try:
+                    found = self.strains(segment, float(pressure))
+                except ConvergenceError:
+                    break
+                e[i, j], k[i, j] = found.e, found.k
+        return RodStrains(e, k)
+
+    def excess(self, segment, pressure):
+        """How far (0: not at all) the segment lies outside what the law knows, (d,) in widths of that."""
+        return np.zeros(1)
+
+    def doubts(self, segment, pressure):
+        """Reasons, as text, not to trust the law for a segment at a pressure or several; () when there are none."""
+        return ()
+
+
+def checked_pressure(pressure):
+    """Pressure as an array; InputError where it is not finite or negative."""
+    pressure = np.asarray(pressure, float)
+    if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
+        raise InputError("pressure_kPa: give finite values >= 0")
+    return pressure
+
+
+class AnalyticModel(SegmentLaw):
     """The two analytic laws: the twisting tube and the one-sided minimum-potential-energy cell.
 
     Nothing in them is fitted to finite elements. The twisting tube's E_t is 3 mu, the modulus of the solid walls along
@@ -41,10 +74,7 @@ class AnalyticModel:
 
         ConvergenceError, with the pressure reached, where the model has no stable equilibrium.
         """
-        pressure = np.asarray(pressure, float)
-        if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
-            raise InputError("pressure_kPa: give finite values >= 0")
-        key = segment.key
+        pressure, key = checked_pressure(pressure), segment.key
         levels, where = np.unique(pressure, return_inverse=True)
         e, k = self._solved(key, tuple(levels.tolist()))
         where = where.reshape(pressure.shape)
@@ -78,18 +108,20 @@ def _twisting_law(segment):
     return strains
 
 
-def manipulator_strains(manipulator, pressure, model):
-    """RodStrains (pieces, 3) of `Manipulator.pieces`: the model's for active ones, unstrained for passive ones."""
-    by_segment = [model.strains(s, float(pressure)) for s in manipulator.segments]
-    rest = RodStrains.unstrained()
-    by_piece = [rest if i is None else by_segment[i] for i, _ in manipulator.pieces]
-    return RodStrains([s.e for s in by_piece], [s.k for s in by_piece])
-
-
-def predict(manipulator, pressure, model=None, spacing=1.0, base_pose=None):
-    """The Centreline of a free manipulator at `pressure` (MPa) by a SegmentLaw, by default the AnalyticModel.
+def predict(manipulator, pressure, law, spacing=1.0, base_pose=None):
+    """The Centreline of a free manipulator at `pressure` (MPa) by a SegmentLaw, end effects included (reduced.ends).
 
     spacing in mm; base_pose (4, 4) the base frame, default the identity.
     """
-    lengths = [length for _, length in manipulator.pieces]
-    return centreline(lengths, manipulator_strains(manipulator, pressure, model or AnalyticModel()), spacing, base_pose)
+    segments = manipulator.segments
+    pieces = free_manipulator(segments, law.each(segments, pressure), [s.chambers for s in segments])
+    return centreline(*pieces, spacing, base_pose)
+
+
+def doubts(manipulator, pressure, law):
+    """Lines of text, one a reason, not to trust a SegmentLaw for the manipulator at a pressure (MPa) or several."""
+    who = {}
+    for i, segment in enumerate(manipulator.segments, start=1):
+        for reason in law.doubts(segment, pressure):
+            who.setdefault(reason, []).append(str(i))
+    return tuple(f"segment {', '.join(numbers)}: {reason}" for reason, numbers in who.items())

@@ -12,8 +12,8 @@ import numpy as np
 from base.errors import InputError
 from base.strains import RodStrains
 from geometry.loading import DeadLoads
-from geometry.parameters import ONE_SIDED
 from reduced.centreline import Centreline, centreline
+from reduced.ends import end_turn
 from reduced.rod_equilibrium import refine
 from reduced.section import active_mass, passive_mass
 from reduced.section_laws import passive_law
@@ -117,15 +117,6 @@ class Rod:
             raise InputError("loads: give three finite numbers each for gravity, tip_force, tip_moment and distributed")
         s, poses, wrench, *effort = refine(self, vectors, tolerance, first_load)
         return RodState(Centreline(s, poses), wrench[:, 3:], wrench[:, :3], *effort)
-
-
-def end_turn(segment, free):
-    """Turn (rad) about z of the section frame from the bare base end to the active part with free strains (6,); at the tip end back.
-
-    A line at height z of the section runs at the slope e2 - k1 z to the frame's x axis. The bottom of a one-sided core carries no
-    chambers, and slanted ones do not shear it: the line along it goes on straight from the bare end. (Measured, not derived.)
-    """
-    return float(free[3] * segment.core_bottom - free[1]) if segment.kind == ONE_SIDED else 0.0
 
 
 @dataclass(frozen=True)

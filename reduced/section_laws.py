@@ -118,7 +118,7 @@ def beam_stiffness(rectangles, torsion):
 
 def passive_law(segment, curvature=0.0):
     """The QuadraticLaw of a segment's bare core with its channel: ends, plugs and joints, which the pressure leaves unstrained;
-    curvature: free curvature about z, 1/mm, all the same (reduced.rod.end_turn).
+    curvature: free curvature about z, 1/mm, all the same (reduced.ends.end_turn).
 
     (Around a thin bore in an incompressible core, thrust on the cap and pressure on the wall cancel in the elongation.) Torsion is
     that of the full rectangle (Timoshenko & Goodier, Theory of Elasticity, Sec. 109) less the channel's polar moment.

@@ -9,7 +9,6 @@ from base.files import write_csv
 from base.strains import RodStrains
 from geometry.designfile import Design, body_tables, write_design
 from geometry.parameters import Manipulator, Segment
-from reduced.centreline import centreline
 from reduced.model import AnalyticModel, predict
 
 FACTOR = 0.8
@@ -19,13 +18,12 @@ HELIX = Segment("one-sided", 60.0, 9, gap=1.5)
 PLANE = Segment("one-sided", 90.0, 4, gap=1.5)
 
 
-def scaled_strains(manipulator, pressure, model):
-    """(pieces, segments): RodStrains of the pieces in a row and of the segments, FACTOR times the model's."""
-    rest = RodStrains.unstrained()
-    each = [model.strains(s, pressure) for s in manipulator.segments]
-    each = [RodStrains(rest.e + FACTOR * (s.e - rest.e), FACTOR * s.k) for s in each]
-    pieces = [rest if i is None else each[i] for i, _ in manipulator.pieces]
-    return tuple(RodStrains([s.e for s in group], [s.k for s in group]) for group in (pieces, each))
+class Scaled(AnalyticModel):
+    """FACTOR times the analytic model's strains."""
+
+    def strains(self, segment, pressure):
+        rest, s = RodStrains.unstrained(), super().strains(segment, pressure)
+        return RodStrains(rest.e + FACTOR * (s.e - rest.e), FACTOR * s.k)
 
 
 def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, contact=False, solve=True, fields=True):
@@ -39,12 +37,13 @@ def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1
     wave = np.column_stack([np.zeros_like(line.s), np.zeros_like(line.s), 1.5 * (1 - np.cos(line.s / 20.0))])
     write_csv(directory / "target.csv", ["x_mm", "y_mm", "z_mm"], line.points + wave)
     write_csv(directory / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"], np.column_stack([line.s, line.points]))
-    (directory / "run.json").write_text(json.dumps({"command": "pneunet design target.csv", "revision": "abc"}))
+    record = {"command": "pneunet design target.csv", "revision": "abc", "inputs": {"law": "analytic"}}
+    (directory / "run.json").write_text(json.dumps(record))
     if not solve:
         return design
     (directory / "mesh").mkdir(exist_ok=True)
     (directory / "mesh" / "mesh.json").write_text(json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}}))
-    _solve(directory / "solve", design, model, reached, overlap, contact, fields)
+    _solve(directory / "solve", design, Scaled(), reached, overlap, contact, fields)
     return design
 
 
@@ -52,14 +51,12 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
     folder.mkdir(exist_ok=True)
     manipulator = design.manipulator
     steps, centrelines, segments = [], [], []
-    lengths = [length for _, length in manipulator.pieces]
     for n, p in enumerate(design.pressure * reached * np.linspace(0, 1, 5)):
-        pieces, each = scaled_strains(manipulator, p, model)
-        line = centreline(lengths, pieces, spacing=3.0)
+        line, each = predict(manipulator, p, model, spacing=3.0), [model.strains(s, p) for s in manipulator.segments]
         work = (4, 2) if n else (0, 0)
         steps.append([n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 1 + 5 * p, 1.5 * n])
         centrelines += [[n, p * 1e3, s, *point] for s, point in zip(line.s, line.points)]
-        segments += [[n, p * 1e3, i + 1, *each.e[i], *each.k[i]] for i in range(len(manipulator.segments))]
+        segments += [[n, p * 1e3, i + 1, *one.e, *one.k] for i, one in enumerate(each)]
     walls = [
         [i + 1, "top" if side > 0 else "bottom", gap, s.gap, s.gap * (0.4 + 0.5 * gap / s.chambers)]
         for i, s in enumerate(manipulator.segments)

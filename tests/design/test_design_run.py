@@ -5,8 +5,10 @@ import pytest
 
 from base.errors import InputError
 from base.files import read_columns
+from design.comparison import Comparison
 from design.metrics import compare
 from design.run import run_design
+from design.rundata import read_run
 from geometry.designfile import read_design
 from geometry.parameters import Manipulator, Segment
 from reduced.model import predict
@@ -49,6 +51,26 @@ def test_the_same_input_gives_the_same_design(helix, tmp_path):
     for name in ("a", "b"):
         run_design(helix, tmp_path / name, ToyLaw(), say=lambda text: None)
     assert (tmp_path / "a/design.toml").read_text() == (tmp_path / "b/design.toml").read_text()
+
+
+class Doubtful(ToyLaw):
+    def doubts(self, segment, pressure):
+        return ("it is a toy",)
+
+
+def test_what_the_law_doubts_is_said_once_and_kept_or_refused(helix, tmp_path):
+    said = []
+    with pytest.raises(InputError, match="the law 'toy' doubts the design: segment 1: it is a toy"):
+        run_design(helix, tmp_path / "out", Doubtful(), say=said.append, outside="refuse")
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match="outside = 'ignore' is not known"):
+        run_design(helix, tmp_path / "out", Doubtful(), say=said.append, outside="ignore")
+    said.clear()
+    design = run_design(helix, tmp_path / "out", Doubtful(), say=said.append)
+    assert said.count("warning: segment 1: it is a toy") == 1
+    assert design.result["doubts"] == ["segment 1: it is a toy"]
+    notes = Comparison.of(read_run(tmp_path / "out"), Doubtful()).notes
+    assert any("'toy'" in note and "segment 1: it is a toy" in note for note in notes)
 
 
 def test_bad_input_leaves_nothing_behind(helix, tmp_path):

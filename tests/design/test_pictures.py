@@ -10,6 +10,7 @@ from design.drawing import chamber_plan, section_groups, segment_table
 from design.labels import plain, segment_name, significant
 from geometry.designfile import Design
 from geometry.parameters import Manipulator, Segment
+from reduced.model import AnalyticModel
 from tests.design.fake_run import HELIX, PLANE, POSE, TWIST, make_run
 
 
@@ -119,7 +120,7 @@ def test_shape_files(tmp_path):
     from design.shape import run_shape
 
     make_run(tmp_path, solve=False)
-    folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, say=lambda text: None)
+    folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, lambda text: None, AnalyticModel())
     rows = read_columns(folder / "centrelines.csv", ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"])
     at_design = rows[rows[:, 0] == 20.0][:, 1:]
     assert at_design == pytest.approx(read_columns(tmp_path / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"]))
@@ -130,17 +131,15 @@ def test_shape_files(tmp_path):
     assert (folder / "inflation.gif").stat().st_size < 3e6
 
 
-class Limited:
+class Limited(AnalyticModel):
     """A law that has no solution above 15 kPa."""
 
     name = "limited"
 
     def strains(self, segment, pressure):
-        from reduced.model import AnalyticModel
-
         if np.max(pressure) > 0.015:
             raise ConvergenceError("limit at 15 kPa")
-        return AnalyticModel().strains(segment, pressure)
+        return super().strains(segment, pressure)
 
 
 def test_shape_beyond_the_limit_keeps_and_names_the_rest(tmp_path):
@@ -149,7 +148,7 @@ def test_shape_beyond_the_limit_keeps_and_names_the_rest(tmp_path):
 
     make_run(tmp_path, (PLANE,), pressure=0.01, solve=False)
     with pytest.raises(ConvergenceError, match=r"no shape at 20 kPa.*kept in .*: 10 kPa"):
-        run_shape(tmp_path / "design.toml", [0.01, 0.02], tmp_path, say=lambda text: None, model=Limited())
+        run_shape(tmp_path / "design.toml", [0.01, 0.02], tmp_path, say=lambda text: None, law=Limited())
     assert (tmp_path / "shape" / "body_10kPa.vtp").exists()
 
 

@@ -4,9 +4,10 @@ import numpy as np
 
 from base.errors import ConvergenceError
 from base.strains import RodStrains
+from reduced.model import SegmentLaw
 
 
-class ToyLaw:
+class ToyLaw(SegmentLaw):
     name = "toy"
 
     def __init__(self, limit=np.inf):

@@ -110,10 +110,6 @@ def test_manipulator_adds_up():
     lengths = [s.length for s in m.segments]
     assert m.length == pytest.approx(sum(lengths)) and m.chambers == 11
     assert m.starts == pytest.approx([0.0, lengths[0], lengths[0] + lengths[1]])
-    pieces = m.pieces
-    assert [i for i, _ in pieces] == [None, 0, None, None, 1, None, None, 2, None]
-    assert sum(length for _, length in pieces) == pytest.approx(m.length)
-    assert [length for i, length in pieces if i is not None] == pytest.approx([s.active_length for s in m.segments])
 
 
 def test_joints_that_do_not_fit_are_refused():

@@ -244,10 +244,17 @@ def test_shapes_beyond_the_reduced_models_limit_keep_the_others(folder, capsys, 
     from design import shape
 
     monkeypatch.setattr(shape, "_pictures", lambda *a: None)
-    assert main(["shape", "good.toml", "--pressure-kPa", "5,1900", "-o", "out"]) == 2
+    assert main(["shape", "good.toml", "--law", "analytic", "--pressure-kPa", "5,1900", "-o", "out"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "no shape at 1900 kPa" in error and "kept in out/shape: 5 kPa" in error
     assert (folder / "out" / "shape" / "centrelines.csv").is_file()
+
+
+@pytest.mark.parametrize("command", ["design", "shape", "report"])
+def test_a_law_that_is_none_is_one_line(folder, capsys, command):
+    assert main([command, "good.toml", "--law", "best"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "--law best: write 'trained', 'analytic' or the .npz file" in error
 
 
 STUDY = """kind = "cell"

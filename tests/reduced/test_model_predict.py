@@ -9,8 +9,9 @@ from base.errors import InputError
 from base.materials import NeoHookean
 from base.strains import RodStrains
 from geometry import Manipulator, Segment
-from reduced import AnalyticModel, predict
-from reduced.model import manipulator_strains
+from reduced import AnalyticModel, QuadraticLaw, Rod, predict
+from reduced.ends import free_manipulator
+from reduced.model import SegmentLaw, doubts
 
 TWISTING = Segment("twisting", 60.0, 4, cavity_floor=0.5)
 BENDING = Segment("one-sided", 90.0, 3)
@@ -38,36 +39,51 @@ def test_twisting_segments_twist_like_their_layers_and_do_not_bend():
     np.testing.assert_allclose(AnalyticModel().strains(TWISTING.mirrored, 0.02).k, -strains.k, rtol=1e-9)
 
 
-def test_passive_pieces_are_unstrained_and_frames_continuous():
-    line = predict(ARM, 0.03)
+def test_cells_count_with_whole_pitches_and_frames_are_continuous():
+    line = predict(ARM, 0.03, AnalyticModel())
     assert line.s[-1] == pytest.approx(ARM.length)
     ends = np.concatenate([ARM.starts, ARM.starts + [s.length for s in ARM.segments]])
     assert all(np.isclose(line.s, end).any() for end in ends)
-    strains = manipulator_strains(ARM, 0.03, AnalyticModel())
-    passive = [i for i, (owner, _) in enumerate(ARM.pieces) if owner is None]
-    np.testing.assert_array_equal(strains.k[passive], 0.0)
-    np.testing.assert_array_equal(strains.e[passive], np.tile([1.0, 0, 0], (len(passive), 1)))
+    free = AnalyticModel().each(ARM.segments, 0.03)
+    lengths, strains = free_manipulator(ARM.segments, free, [s.chambers for s in ARM.segments])
+    assert lengths[1::3] == pytest.approx([s.chambers * s.pitch for s in ARM.segments])
+    assert sum(lengths) == pytest.approx(ARM.length)
+    for ends in (slice(0, None, 3), slice(2, None, 3)):  # bare core: no stretch, no twist, no bending but that of a slanted end
+        np.testing.assert_array_equal(strains.e[ends], np.tile([1.0, 0, 0], (3, 1)))
+        np.testing.assert_array_equal(strains.k[ends, :2], 0.0)
+        assert [bool(k) for k in strains.k[ends, 2]] == [False, False, True]
+
+
+def test_a_free_rod_and_a_prediction_are_the_same():
+    model = AnalyticModel()
+    laws = [QuadraticLaw([0.03], [np.hstack([q.e, q.k])], np.eye(6)[None]) for q in (model.strains(s, 0.03) for s in ARM.segments)]
+    np.testing.assert_allclose(Rod.of(ARM, laws, 0.03).free().points[-1], predict(ARM, 0.03, model).points[-1], atol=1e-9)
 
 
 def test_no_pressure_no_shape_change():
-    line = predict(ARM, 0.0)
+    line = predict(ARM, 0.0, AnalyticModel())
     np.testing.assert_allclose(line.points, np.stack([line.s, 0 * line.s, 0 * line.s], axis=1), atol=1e-9)
 
 
 def test_mirrored_manipulators_have_mirrored_centrelines():
-    np.testing.assert_allclose(predict(ARM.mirrored, 0.03).points, predict(ARM, 0.03).points * [1, -1, 1], atol=1e-8)
+    one, other = (predict(arm, 0.03, AnalyticModel()).points for arm in (ARM, ARM.mirrored))
+    np.testing.assert_allclose(other, one * [1, -1, 1], atol=1e-8)
 
 
 def test_any_law_with_strains_can_predict():
-    class Law:
+    class Law(SegmentLaw):
         name = "constant"
 
         def strains(self, segment, pressure):
             return RodStrains([1 + pressure, 0, 0], [0, 0, 0])
 
+        def doubts(self, segment, pressure):
+            return ("it is made up",) if segment.kind == "one-sided" else ()
+
     line = predict(ARM, 0.5, Law())
-    active = sum(s.active_length for s in ARM.segments)
+    active = sum(s.chambers * s.pitch for s in ARM.segments)
     assert line.length == pytest.approx(ARM.length + 0.5 * active)
+    assert doubts(ARM, 0.5, Law()) == ("segment 2, 3: it is made up",)
 
 
 @pytest.mark.parametrize("pressure", [-0.01, np.nan])

@@ -1,0 +1,92 @@
+"""Figures of the trained law that comes along: its errors on designs that it has not seen, computed anew from data set and law, and
+what it costs.
+"""
+
+import numpy as np
+
+from benchmarks.rod import best_seconds
+from benchmarks.tables import table
+
+PRESSURE = 0.02  # MPa
+BATCH = 10_000
+MARK = "<!-- made by `python -m benchmarks --only law` and `--snapshot`; do not edit below -->"
+JUDGED = ("law_strain_median_rel", "law_strain_p95_rel", "law_tip100_p95_rel", "law_stiffness_p95_rel", "law_force_p95_rel")
+
+
+def law():
+    """The part `law`."""
+    from base.dataset import read_dataset
+    from base.errors import InputError
+    from reduced.choice import DATA_SET, SHIPPED, read_law
+    from reduced.training import compare_laws, digest, judge, judged_on, learning_curve, samples_of
+
+    data, shipped = read_dataset(DATA_SET), read_law(SHIPPED)
+    if shipped.about["data_sha256"] != digest(DATA_SET):
+        raise InputError(f"{SHIPPED.name} was trained on another data set than {DATA_SET.name}: make it again with pneunet train")
+    samples = samples_of(data)
+    judged = judge(shipped.kinds, samples)
+    details = {
+        kind: {
+            "judged on": judged_on(*pair),
+            "figures": judged[kind],
+            "laws": compare_laws(*pair),
+            "learning curve": learning_curve(*pair),
+        }
+        for kind, pair in samples.items()
+    }
+    # the worse kind's; an interval is as bad as it is off
+    figures = {key: max(one[key] for one in judged.values()) for key in JUDGED}
+    inside = [one["law_interval_coverage_90"] for one in judged.values()]
+    figures["law_interval_coverage_90"] = max(inside, key=lambda share: abs(share - 0.9))
+    for kind, number in zip(data.about["kinds"], np.bincount(data.kind[_coarse(data)], minlength=len(data.about["kinds"]))):
+        figures[f"dataset_{kind.replace('-', '_')}"] = int(number)
+    figures["dataset_accepted_fraction"] = float(data.accepted.mean())
+    return figures | costs(shipped), details
+
+
+def _coarse(data):
+    """(n,) bool: accepted cases, each design once."""
+    first = {}
+    for row in np.flatnonzero(data.accepted):
+        first.setdefault((data.kind[row], data.design[row]), row)
+    chosen = np.zeros(len(data.kind), bool)
+    chosen[list(first.values())] = True
+    return chosen
+
+
+def costs(shipped):
+    """What calls of a RodLaw cost, the dearer kind's, CPU s on one core."""
+    from geometry import Manipulator
+    from geometry.shape_numbers import shape_numbers
+    from reduced import predict
+    from reduced.choice import SHIPPED, read_law
+    from tests.cases import CASES
+
+    kinds = {"twisting": CASES["twist_w12"](60.0, 5), "one-sided": CASES["one_sided_w10"](60.0, 6)}
+    known = [segment for kind, segment in kinds.items() if kind in shipped.kinds]
+    batches = []
+    for segment in known:
+        shape = np.repeat([shape_numbers(segment)], BATCH, axis=0)
+        shape[:, 1:] *= np.random.default_rng(0).uniform(0.9, 1.1, (BATCH, shape.shape[1] - 1))
+        batches.append((shipped.kinds[segment.kind], shape, np.linspace(0.01, 0.3, BATCH)))
+    body = Manipulator((known * 4)[:4])
+    spacing = body.length / 195
+    return {
+        "law_batch_10k_seconds": max(best_seconds(lambda b=b: b[0].free_strains_and_slopes(*b[1:]), 1) for b in batches),
+        "law_single_us": 1e6 * max(best_seconds(lambda s=s: shipped.strains(s, PRESSURE), 100) for s in known),
+        "law_load_ms": 1e3 * best_seconds(lambda: read_law(SHIPPED), 1),
+        "rod_free_shape_with_law_us": 1e6 * best_seconds(lambda: predict(body, PRESSURE, shipped, spacing), 50),
+    }
+
+
+def page(text, details):
+    """docs/rod-law.md, of which `text` is the present one, with the part below MARK made anew."""
+    lines = [text.partition(MARK)[0].rstrip(), "", MARK, "", "## How well it does"]
+    for kind, found in details.items():
+        lines += ["", f"### {kind}", "", found["judged on"], ""]
+        lines += table(["figure", "value"], [(f"`{name}`", f"{value:.4g}") for name, value in found["figures"].items()])
+        rows = [(name, f"{median:.2%}", f"{high:.2%}", f"{without:.1%}") for name, median, high, without in found["laws"]]
+        lines += ["", *table(["law of the free strains", "median error", "95th percentile", "without an answer"], rows)]
+        rows = [(n, f"{median:.2%}", f"{high:.2%}") for n, median, high in found["learning curve"]]
+        lines += ["", *table(["designs trained on", "median error", "95th percentile"], rows)]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,116 @@
+"""The states of a data set that a law is trained on and judged by, and how designs are kept apart for the judging."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from reduced.law_coordinates import REST, Coordinates
+
+#: held-out designs that suffice to judge a law; with fewer the training designs are judged too, by laws that have not seen them
+ENOUGH = 100
+#: parts that the training designs fall into for that
+PARTS = 10
+
+
+@dataclass(frozen=True)
+class States:
+    """Free states of one kind, rest included: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers,
+    level (n,) of the mesh, the finest last, and size (n,): norm of the free strains, rest taken off, at the case's top pressure."""
+
+    kind: str
+    shape: np.ndarray
+    pressure: np.ndarray
+    strains: np.ndarray
+    matrices: np.ndarray
+    design: np.ndarray
+    level: np.ndarray
+    size: np.ndarray
+
+    def of(self, chosen):
+        return States(self.kind, *(getattr(self, f.name)[chosen] for f in fields(self)[1:]))
+
+    @property
+    def loaded(self):
+        """Those with pressure."""
+        return self.of(self.pressure > 0)
+
+    @property
+    def case(self):
+        """(n,) equal for the states of one design on one mesh."""
+        return self.design * (1 + self.level.max(initial=0)) + self.level
+
+    @property
+    def inputs(self):
+        return Coordinates(self.kind).inputs(self.shape, self.pressure, self.level)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Cells of one kind: free States, and of those at prescribed strains the free state (`around`, States), the change (m, 6) of the
+    strains from there and the forces (m, 6)."""
+
+    free: States
+    around: States
+    change: np.ndarray
+    forces: np.ndarray
+
+    def of(self, designs):
+        """Those of the designs with these numbers."""
+        held = np.isin(self.around.design, designs)
+        return Sample(self.free.of(np.isin(self.free.design, designs)), self.around.of(held), self.change[held], self.forces[held])
+
+    def on(self, level):
+        """Those on one mesh."""
+        held = self.around.level == level
+        return Sample(self.free.of(self.free.level == level), self.around.of(held), self.change[held], self.forces[held])
+
+    @property
+    def doubled(self):
+        """(m,) bool: prescribed are twice the free strains, others than those went in some direction."""
+        free = self.around.strains - REST
+        return np.linalg.norm(self.change - free, axis=1) < 1e-3 * np.linalg.norm(free, axis=1)
+
+    @property
+    def designs(self):
+        return np.unique(self.free.design)
+
+
+def sample_of(data, kind, held_out):
+    """The Sample of a kind's accepted cases in CellData, of the held-out designs or of all others."""
+    k = data.about["kinds"].index(kind)
+    cases = data.accepted & (data.kind == k) & (data.held_out == held_out)
+    sizes = [min(size for key, size in mesh.items() if key != "name") for mesh in data.about["meshes"]]
+    level = np.argsort(np.argsort(-np.array(sizes)))
+    rows = np.flatnonzero(cases[data.case] & ~data.overlapping)
+    free, held = rows[~data.prescribed[rows]], rows[data.prescribed[rows]]
+    top = {}
+    for i in free:  # pressures increase
+        top[data.case[i]] = np.linalg.norm(data.strains[i] - REST)
+    at = {(data.case[i], round(float(data.pressure[i]), 6)): n for n, i in enumerate(free)}
+    states = States(
+        kind,
+        *(a.astype(float) for a in (data.shape[data.case[free]], data.pressure[free], data.strains[free], data.matrices[free])),
+        data.design[data.case[free]],
+        level[data.mesh[data.case[free]]],
+        np.array([top[data.case[i]] for i in free]),
+    )
+    held = np.array([i for i in held if (data.case[i], round(float(data.pressure[i]), 6)) in at], int)
+    where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)
+    change = data.strains[held].astype(float) - states.strains[where]
+    return Sample(states, states.of(where), change, data.forces[held].astype(float))
+
+
+def folds(designs, parts):
+    """Pairs (other numbers, numbers of one part) of designs, dealt out at random, the same for the same designs."""
+    part = np.random.default_rng(0).permutation(len(designs)) % parts
+    for f in range(parts):
+        yield designs[part != f], designs[part == f]
+
+
+def splits(training, held_out):
+    """[(what a law learns from, what it is judged on)] of two Samples: as they are, and where the held-out designs are too few
+    also by PARTS of the training designs."""
+    pairs = [(training, held_out)]
+    if len(held_out.designs) < ENOUGH:
+        pairs += [(training.of(learned), training.of(judged)) for learned, judged in folds(training.designs, PARTS)]
+    return pairs
