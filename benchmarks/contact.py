@@ -124,9 +124,10 @@ def finer_mesh(reference):
 
 
 def limit(values):
-    """Where a sequence with steps that shrink by a common factor goes (Aitken): its last three give the factor."""
-    a, b, c = values[-3:]
-    return c - (c - b) ** 2 / ((c - b) - (b - a))
+    """Where values at SOFTNESSES go as the medium vanishes: by the polynomial through them (Richardson)."""
+    from hifi.stepping import lagrange_coefficients
+
+    return float(np.dot(lagrange_coefficients(SOFTNESSES, 0.0), values))
 
 
 def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSES):
