@@ -188,8 +188,16 @@ def exact(reference):
     return {"contact_pressed_force_rel": force.relative_error}, {"pressed_dofs": force.dofs, "pressed_torque_N_mm": torque}
 
 
+def segment_on_two_ranks(reference):
+    """The middle of a finite segment against the cell."""
+    from benchmarks.contact_segment import beside_cell
+
+    figures, facts = beside_cell({s.pressure: twist(s) for s in reference.states}, reference.folder)
+    return figures, {"segment": facts}
+
+
 #: each takes the Reference and returns ({key: number}, details)
-PIECES = (angles, bias, parameters, finer_mesh, force_check, exact)
+PIECES = (angles, bias, parameters, finer_mesh, force_check, exact, segment_on_two_ranks)
 
 
 def contact(pieces=PIECES):
