@@ -1,14 +1,20 @@
-"""Figures of self-contact in the unit cell twist-w15: distances, bias, sensitivity, an independent method, cost."""
+"""Figures of self-contact in the unit cell twist-w15: distances, bias, sensitivity, an independent method, an exact solution, cost."""
 
 import tempfile
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 SIZE, FINER = 2.0, 1.5
 TOP = 0.05
+#: pressures (MPa) at which the third medium is asked for the force between chambers
+CHECKED = (0.01, 0.03, 0.05)
+#: of the default medium's stiffness, thickness when squeezed (J0) and regularisation: what the extrapolation starts from
+SOFTNESSES = (1.0, 0.5, 0.25)
+#: of the pressure of first touch: where the bias before contact is measured
+JUST_BEFORE = 0.985
 
 
 def segment(name="twist_w15", angle=60.0, mu=0.317):
@@ -18,17 +24,15 @@ def segment(name="twist_w15", angle=60.0, mu=0.317):
     return CASES[name](angle=angle, chambers=1, material=NeoHookean(mu))
 
 
-def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, medium=None):
-    """(states, CPU seconds, path of the mesh, pressure of first touch or None)."""
+def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, **case):
+    """(states, CPU seconds, pressure of first touch or None)."""
     from hifi.cell_run import solve_cell
     from hifi.cellfile import CellCase
 
-    case = CellCase(body, pressure, size, levels, contact=contact)
-    case = replace(case, medium=medium) if medium else case
     path, states, touches = Path(folder) / f"{time.monotonic_ns()}.msh", [], []
     started = time.process_time()
-    solve_cell(case, path, states.append, on_touch=touches.append)
-    return states, time.process_time() - started, path, touches[0] if touches else None
+    solve_cell(CellCase(body, pressure, size, levels, contact=contact, **case), path, states.append, on_touch=touches.append)
+    return states, time.process_time() - started, touches[0] if touches else None
 
 
 def twist(state):
@@ -36,73 +40,185 @@ def twist(state):
     return state.strains.k[0] / state.strains.e[0] * 1e3
 
 
+def curvature(state):
+    return np.linalg.norm(state.strains.k)
+
+
 def farthest(states, gap):
     """Largest distance of walls where they push at each other, either side of zero, over the gap."""
     return max(max(abs(s.contact.nearest), abs(s.contact.farthest)) / gap for s in states if s.contact and s.contact.area)
 
 
-def bias(folder, body, pressure, measure):
-    """Relative difference of `measure` between the third medium and none at a pressure (MPa) at which nothing touches."""
-    with_medium, without = (measure(run(folder, body, contact, pressure, 1)[0][-1]) for contact in ("third-medium", "none"))
-    return abs(with_medium / without - 1)
+@dataclass(frozen=True)
+class Reference:
+    """The cell twist-w15, 60 degrees, with and without contact at SIZE; `folder` for meshes."""
+
+    folder: Path
+    body: object
+    states: list
+    loose: list
+    touch: float
+
+    @property
+    def increment(self):
+        """What contact adds to the twist at the top pressure, rad/m."""
+        return twist(self.states[-1]) - twist(self.loose[-1])
 
 
-def force_check(body, states, path):
-    """({key: worst relative difference of the resultant from the penalty's at 10, 30 and 50 kPa}, [(kPa, N, N), ...]).
-
-    Where the penalty finds no equilibrium its force is None, and there is no figure.
-    """
-    from benchmarks import wall_penalty
-    from hifi.solver import NotConverged
-    from hifi.walls import CellWalls
-
-    rows = []
-    for state in states:
-        if any(abs(state.pressure - p) < 1e-9 for p in (0.01, 0.03, 0.05)):
-            problem = wall_penalty.PenaltyCell(body, path, CellWalls)
-            strains = np.concatenate([state.strains.e, state.strains.k])
-            try:
-                forces = wall_penalty.solve(problem, state.pressure, state.array, strains)[-1][0]
-                checked = float(np.linalg.norm(forces, axis=1).max())
-            except NotConverged:
-                checked = None
-            rows.append((state.pressure * 1e3, state.contact.force, checked))
-    if any(checked is None for _, _, checked in rows):
-        return {}, rows
-    return {"contact_force_check_rel": max(abs(a / b - 1) for _, a, b in rows)}, rows
+def angles(reference):
+    """Distances of walls that push, at three angles of the chambers."""
+    found = {60: reference.states}
+    for angle in (45, 75):
+        found[angle] = run(reference.folder, segment(angle=float(angle)), "auto")[0]
+    figures = {f"contact_distance_rel_gap_{angle}": farthest(states, reference.body.gap) for angle, states in found.items()}
+    rows = [
+        [angle, s.pressure * 1e3, twist(s), s.contact.force, s.contact.area, s.contact.nearest, s.contact.farthest]
+        for angle, states in found.items()
+        for s in states[1:]
+    ]
+    return figures, {"angle_kPa_tau_force_N_area_mm2_nearest_mm_farthest_mm": rows}
 
 
-def contact():
-    """The part `contact`: ({key: value}, details)."""
-    from hifi.contact import ThirdMedium
+def bias(reference):
+    """Before first touch, and where nothing touches at all: what a contact model does that ought to do nothing."""
+    one_sided, folder, before = segment("one_sided_w10", mu=0.2068), reference.folder, JUST_BEFORE * reference.touch
 
-    with tempfile.TemporaryDirectory() as folder:
-        body = segment()
-        run(folder, body, "third-medium", 0.001, 1, 3.0)  # compiles the forms
-        run(folder, body, "none", 0.001, 1, 3.0)
-        states, seconds, path, touch = run(folder, body, "auto")
-        loose, loose_seconds, _, _ = run(folder, body, "none")
-        one_sided = segment("one_sided_w10", mu=0.2068)
-        figures = {
-            "contact_tau_50kPa_rad_per_m": twist(states[-1]),
-            "contact_cost_factor": seconds / loose_seconds,
-            "contact_distance_rel_gap_60": farthest(states, body.gap),
-            "contact_bias_twist_rel": bias(folder, body, 0.985 * touch, twist),
-            "contact_bias_curvature_rel": bias(folder, one_sided, TOP, lambda s: np.linalg.norm(s.strains.k)),
-        }
-        for angle in (45, 75):
-            figures[f"contact_distance_rel_gap_{angle}"] = farthest(run(folder, segment(angle=float(angle)), "auto")[0], body.gap)
-        increment = twist(states[-1]) - twist(loose[-1])
-        scaled = [twist(run(folder, body, "third-medium", levels=1, medium=ThirdMedium().scaled(f))[0][-1]) for f in (0.5, 2.0)]
-        figures["contact_parameter_sensitivity_rel"] = max(abs(t - twist(states[-1])) for t in scaled) / increment
-        fine = [twist(run(folder, body, c, levels=1, size=FINER)[0][-1]) for c in ("third-medium", "none")]
-        figures["contact_mesh_sensitivity_rel"] = abs((fine[0] - fine[1]) / increment - 1)
-        check, forces = force_check(body, states, path)
-        figures |= check
+    def last(body, contact, pressure):
+        return run(folder, body, contact, pressure, 1)[0][-1]
+
+    loose = last(reference.body, "none", before)
+    relative = {c: abs(twist(last(reference.body, c, before)) / twist(loose) - 1) for c in ("auto", "third-medium")}
+    bent = [curvature(last(one_sided, c, TOP)) for c in ("auto", "none")]
+    figures = {"contact_bias_twist_rel": relative["auto"], "contact_bias_curvature_rel": abs(bent[0] / bent[1] - 1)}
+    return figures, {"bias_twist_rel_third_medium": relative["third-medium"]}
+
+
+def parameters(reference):
+    """The penalty's stiffness and onset halved and doubled, one at a time."""
+    from hifi.wall_contact import WallPenalty
+
+    rows, standard = [], WallPenalty()
+    for name in ("stiffness", "onset"):
+        for factor in (0.5, 2.0):
+            penalty = replace(standard, **{name: factor * getattr(standard, name)})
+            last = run(reference.folder, reference.body, "auto", levels=1, penalty=penalty)[0][-1]
+            rows.append([name, factor, twist(last), last.contact.force, farthest([last], reference.body.gap)])
+    change = max(abs(row[2] - twist(reference.states[-1])) for row in rows)
+    figures = {"contact_parameter_sensitivity_rel": change / reference.increment}
     details = {
-        "first_touch_kPa": touch * 1e3,
-        "tau_kPa_with_and_without": [[s.pressure * 1e3, twist(s), twist(t)] for s, t in zip(states, loose)],
-        "force_kPa_medium_and_penalty_N": forces,
-        "tau_50kPa_halved_and_doubled_medium": scaled,
+        "parameter_factor_tau_50kPa_force_N_distance_rel_gap": rows,
+        "parameter_sensitivity_of_twist_rel": change / twist(reference.states[-1]),
     }
+    return figures, details
+
+
+def finer_mesh(reference):
+    """The mesh refined once, with and without contact."""
+    fine, loose = (run(reference.folder, reference.body, c, size=FINER)[0] for c in ("auto", "none"))
+    increment = twist(fine[-1]) - twist(loose[-1])
+    details = {
+        "kPa_tau_finer_with_and_without_force_N": [[s.pressure * 1e3, twist(s), twist(t), s.contact.force] for s, t in zip(fine, loose)],
+        "mesh_sensitivity_of_twist_rel": abs(twist(fine[-1]) / twist(reference.states[-1]) - 1),
+    }
+    return {"contact_mesh_sensitivity_rel": abs(increment / reference.increment - 1)}, details
+
+
+def limit(values):
+    """Where values at SOFTNESSES go as the medium vanishes: by the polynomial through them (Richardson)."""
+    from hifi.stepping import lagrange_coefficients
+
+    return float(np.dot(lagrange_coefficients(SOFTNESSES, 0.0), values))
+
+
+def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSES):
+    """[[kPa, force (N) and twist (rad/m) at each of the softnesses]] of the third medium; ConvergenceError where it finds no state."""
+    from geometry.cell import mesh_cell
+    from hifi.cell import CellProblem
+    from hifi.cell_run import CONTACT_PATIENCE
+    from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
+    from hifi.contact import Softening, ThirdMedium
+    from hifi.control import LoadControl
+    from hifi.newton import NewtonOptions
+    from hifi.path import EquilibriumPath
+    from hifi.stepping import StepSize, run_steps
+
+    mesh_cell(body, size, path, gaps=True)
+    followed = ThirdMedium()
+    problem = CellProblem(body, path, medium=followed)
+    system, energy = CellSystem(problem), problem.medium
+    options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE, patience=CONTACT_PATIENCE)
+    path, rows = EquilibriumPath(system, LoadControl(), options), []
+    for pressure in pressures:
+        run_steps(path, pressure, StepSize(0.02 * body.material.mu, 1e-5))
+        kept, row, medium = system.state.copy(), [pressure * 1e3], followed
+        for softness in softnesses:
+            energy.between(medium)
+            run_steps(EquilibriumPath(Softening(system, energy), LoadControl(), options), 1.0, StepSize(0.5, 1e-3))
+            e, k = np.split(system.state[-6:], 2)
+            row += [problem.measure_contact().force, k[0] / e[0] * 1e3]
+            medium = followed.softer(softness, softness / 2)
+        rows.append(row)
+        energy.between(followed)
+        system.state, path.newton.current = kept, False
+    system.destroy()
+    return rows
+
+
+def force_check(reference):
+    """The force between chambers against the third medium's in the limit of no medium."""
+    from base.errors import ConvergenceError
+
+    try:
+        rows = medium_forces(reference.body, reference.folder / "medium.msh")
+    except ConvergenceError as error:
+        return {}, {"force_check": str(error)}
+    compared = []
+    for kPa, *found in rows:
+        [state] = [s for s in reference.states if abs(s.pressure * 1e3 - kPa) < 1e-6]
+        compared.append([kPa, state.contact.force, limit(found[::2]), twist(state), limit(found[1::2])])
+    details = {"kPa_force_N_tau_of_softer_media": rows, "kPa_force_N_and_limit_tau_and_limit": compared}
+    return {"contact_force_check_rel": max(abs(a / b - 1) for _, a, b, _, _ in compared)}, details
+
+
+def exact(reference):
+    """Cylinders pressed together: their force is known."""
+    from tests.verification.pressed import pressed
+
+    force, torque, _ = pressed(reference.folder)
+    return {"contact_pressed_force_rel": force.relative_error}, {"pressed_dofs": force.dofs, "pressed_torque_N_mm": torque}
+
+
+def segment_on_two_ranks(reference):
+    """The middle of a finite segment against the cell."""
+    from benchmarks.contact_segment import beside_cell
+
+    figures, facts = beside_cell({s.pressure: twist(s) for s in reference.states}, reference.folder)
+    return figures, {"segment": facts}
+
+
+#: each takes the Reference and returns ({key: number}, details)
+PIECES = (angles, bias, parameters, finer_mesh, force_check, exact, segment_on_two_ranks)
+
+
+def contact(pieces=PIECES):
+    """The part `contact`: ({key: value}, details)."""
+    with tempfile.TemporaryDirectory() as folder:
+        body, folder = segment(), Path(folder)
+        for method in ("auto", "none"):  # compiles the forms
+            run(folder, body, method, 0.001, 1, 3.0)
+        states, seconds, touch = run(folder, body, "auto")
+        loose, loose_seconds, _ = run(folder, body, "none")
+        figures = {"contact_tau_50kPa_rad_per_m": twist(states[-1]), "contact_cost_factor": seconds / loose_seconds}
+        details = {
+            "first_touch_kPa": touch * 1e3,
+            "kPa_tau_with_and_without_force_N_overlap_without_mm": [
+                [s.pressure * 1e3, twist(s), twist(t), s.contact.force, t.wall_distance] for s, t in zip(states, loose)
+            ],
+            "steps_factorisations_CPU_s": [[s[-1].steps, s[-1].factorisations, t] for s, t in ((states, seconds), (loose, loose_seconds))],
+        }
+        reference = Reference(folder, body, states, loose, touch)
+        for piece in pieces:
+            found, more = piece(reference)
+            figures |= found
+            details |= more
     return figures, details

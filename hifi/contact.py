@@ -40,18 +40,21 @@ class ThirdMedium:
         """The medium's MediumEnergy on a mesh."""
         return MediumEnergy(self, mesh)
 
-    def scaled(self, factor):
-        """The medium with all of its stiffness, gamma and kr, times `factor`."""
-        gamma, regularisation = (tuple(factor * v for v in pair) for pair in (self.gamma, self.regularisation))
-        return ThirdMedium(gamma, regularisation, self.smallest_volume)
+    def softer(self, start, end):
+        """The medium that goes from `start` times the recorded one to `end` times it; squeezed it is thinner likewise, by J0."""
+        return ThirdMedium(*((start * recorded, end * recorded) for _, recorded in (self.gamma, self.regularisation, self.smallest_volume)))
 
 
 class MediumEnergy:
     """The energy with its parameters as constants that `softening` sets: 0 the followed, 1 the recorded medium."""
 
     def __init__(self, medium, mesh):
+        self._constants = [fem.Constant(mesh, PETSc.ScalarType(1.0)) for _ in range(3)]
+        self.between(medium)
+
+    def between(self, medium):
+        """Go from the `medium`'s followed to its recorded parameters, and stand at the former."""
         self._ends = np.log([medium.gamma, medium.regularisation, medium.smallest_volume])
-        self._constants = [fem.Constant(mesh, PETSc.ScalarType(1.0)) for _ in self._ends]
         self.softening = 0.0
 
     @property

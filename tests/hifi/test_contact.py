@@ -8,54 +8,128 @@ from base.se3 import exp_rotation
 from geometry.cell import mesh_cell
 from hifi.cell import CellProblem
 from hifi.cell_run import solve_cell
+from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
 from hifi.cellfile import CellCase
 from hifi.contact import ThirdMedium
+from hifi.control import LoadControl
+from hifi.newton import NewtonOptions
+from hifi.path import EquilibriumPath
+from hifi.stepping import StepSize, run_steps
+from hifi.wall_contact import WallPenalty
 from hifi.walls import CellWalls
 from tests.cases import CASES
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 
+PRESSURE, SIZE = 0.010, 3.0
 
-@pytest.fixture
+
+@pytest.fixture(scope="module")
 def tall():
     return CASES["twist_w15"](angle=60.0, chambers=1)
 
 
-def run(segment, path, contact, levels, pressure=0.010):
+def run(segment, folder, contact, levels, **case):
+    """(states, pressures of first touch) up to 10 kPa."""
     states, touches = [], []
-    solve_cell(CellCase(segment, pressure, 3.0, levels, contact=contact), path, states.append, on_touch=touches.append)
+    case = CellCase(segment, PRESSURE, SIZE, levels, contact=contact, **case)
+    solve_cell(case, folder / "cell.msh", states.append, on_touch=touches.append)
     return states, touches
 
 
-def test_without_contact_overlap_is_marked_from_first_touch_on(tall, tmp_path):
-    states, touches = run(tall, tmp_path / "cell.msh", "none", 10)
+@pytest.fixture(scope="module")
+def loose(tall, tmp_path_factory):
+    return run(tall, tmp_path_factory.mktemp("loose"), "none", 10)
+
+
+@pytest.fixture(scope="module")
+def touching(tall, tmp_path_factory):
+    return run(tall, tmp_path_factory.mktemp("touching"), "auto", 2)
+
+
+def test_without_contact_overlap_is_marked_from_first_touch_on(loose, tall):
+    states, touches = loose
     distances, pressures = ([getattr(s, name) for s in states] for name in ("wall_distance", "pressure"))
     assert distances[0] == pytest.approx(tall.gap, abs=1e-9)
-    assert (np.diff(distances) < 0).all() and distances[-1] < 0
+    assert (np.diff(distances) < 0).all() and distances[-1] < -0.1 * tall.gap
     assert [s.walls_overlap for s in states] == [d < 0 for d in distances]
     # the load of first touch, from the solver's own steps, against the recorded levels
     assert touches == pytest.approx([np.interp(0.0, distances[::-1], pressures[::-1])], abs=1e-4)
 
 
-def test_contact_comes_on_at_first_touch_and_keeps_walls_apart(tall, tmp_path):
-    loose, _ = run(tall, tmp_path / "loose.msh", "none", 2)
-    states, touches = run(tall, tmp_path / "cell.msh", "auto", 2)
-    assert [s.contact is None for s in states] == [True, True, False]
-    assert states[1].pressure < touches[0] < states[2].pressure
-    last = states[-1]
+def test_contact_changes_nothing_before_first_touch_and_keeps_walls_apart_beyond(loose, touching, tall):
+    states, touches = touching
+    assert touches == pytest.approx(loose[1], rel=0.05)
+    open_, last = states[1:]
+    assert open_.pressure < touches[0] < last.pressure
+    assert open_.contact.force == 0.0
+    assert open_.strains.k[0] == pytest.approx(loose[0][5].strains.k[0], rel=1e-6)
     assert not last.walls_overlap and abs(last.wall_distance) < 0.02 * tall.gap
-    assert loose[-1].wall_distance < -0.1 * tall.gap
     # walls that push at each other turn the chambers further
-    assert last.contact.force > 0
-    assert last.strains.k[0] > 1.01 * loose[-1].strains.k[0]
-    # the medium's part in the rod's forces and stiffness is complete
+    assert last.contact.force > 0 and -0.02 * tall.gap < last.contact.nearest <= last.contact.farthest < 0.02 * tall.gap
+    assert last.strains.k[0] > 1.01 * loose[0][-1].strains.k[0]
+
+
+def test_contact_is_complete_in_the_rod_s_forces_and_stiffness(touching):
+    last = touching[0][-1]
     assert np.concatenate([last.force, last.moment]) == pytest.approx(np.zeros(6), abs=1e-6)
     assert abs(last.stiffness - last.stiffness.T).max() < 1e-8 * abs(last.stiffness).max()
     assert last.unstable == 0
 
 
+def follow(system, target, first):
+    run_steps(EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)), target, StepSize(first, 1e-5))
+
+
+def test_in_contact_stiffness_is_the_slope_of_forces_at_prescribed_strains(tall, tmp_path):
+    mesh_cell(tall, SIZE, tmp_path / "cell.msh")
+    problem = CellProblem(tall, tmp_path / "cell.msh", contact=WallPenalty())
+    free = CellSystem(problem)
+    follow(free, PRESSURE, 0.004)
+    state, rest = free.measure(), free.state.copy()
+    direction, h, ends = np.array([0.01, -0.005, 0.004, 0.001, 0.0008, -0.0006]), 2e-3, []
+    for sign in (1, -1):
+        held = CellSystem(problem, np.ones(6, bool), (PRESSURE, 0.0), (rest[-6:], sign * h * direction))
+        held.state = rest.copy()
+        follow(held, 1.0, 1.0)
+        moved = held.measure()
+        ends.append(np.concatenate([moved.force, moved.moment]))
+        held.destroy()
+    free.destroy()
+    assert state.contact.force > 0.01
+    product = state.stiffness @ direction
+    assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(product, rel=1e-4, abs=1e-4 * np.linalg.norm(product))
+
+
+def test_a_prescribed_twist_in_contact(touching, tall, tmp_path):
+    """What it takes to twist further is what the free state's compliance says."""
+    free, change = touching[0][-1], 2e-4
+    states, _ = run(tall, tmp_path, "auto", 1, held={3: free.strains.k[0] + change})
+    forces = np.concatenate([states[-1].force, states[-1].moment])
+    assert np.delete(forces, 3) == pytest.approx(np.zeros(5), abs=1e-6)
+    assert forces[3] == pytest.approx(change / np.linalg.inv(free.stiffness)[3, 3], rel=0.1)
+
+
+def test_volume_control_goes_through_contact(touching, tall, tmp_path):
+    """Led by the volume the path comes by the states that the pressure leads to."""
+    first, last = touching[0][0], touching[0][-1]
+    states, touches = run(tall, tmp_path, "auto", 1, control="volume", volume_factor=last.volume / first.volume)
+    assert touches == pytest.approx(touching[1], rel=0.05)
+    assert states[-1].pressure == pytest.approx(last.pressure, rel=1e-6)
+    assert states[-1].contact.force == pytest.approx(last.contact.force, rel=1e-5)
+
+
+def test_the_third_medium_finds_the_same_contact(touching, tall, tmp_path):
+    """Its bias thickens walls by what is left of the medium, so that they push earlier: shortly after first touch by a tenth."""
+    states, _ = run(tall, tmp_path, "third-medium", 1)
+    here, there = states[-1], touching[0][-1]
+    assert here.contact.gamma == pytest.approx(ThirdMedium().gamma[1]) and not here.walls_overlap
+    assert here.strains.k[0] == pytest.approx(there.strains.k[0], rel=0.01)
+    assert here.contact.force == pytest.approx(there.contact.force, rel=0.2)
+
+
 def test_both_walls_of_a_gap_are_whole_and_a_gap_apart(tall, tmp_path):
-    mesh_cell(tall, 3.0, tmp_path / "cell.msh", cut=1.3, gaps=True)
+    mesh_cell(tall, SIZE, tmp_path / "cell.msh", cut=1.3, gaps=True)
     walls = CellWalls(CellProblem(tall, tmp_path / "cell.msh"))
     area = tall.width / tall.sin * (tall.chamber_top - tall.core_top)
     for gap in walls.gaps:
@@ -67,7 +141,7 @@ def test_both_walls_of_a_gap_are_whole_and_a_gap_apart(tall, tmp_path):
 
 def test_a_straight_medium_seen_from_a_twisting_frame_is_at_rest(tall, tmp_path):
     """The gradient of F along X1 contains the screw's rotation: without it a body at rest would push."""
-    mesh_cell(tall, 3.0, tmp_path / "cell.msh", gaps=True)
+    mesh_cell(tall, SIZE, tmp_path / "cell.msh", gaps=True)
     problem = CellProblem(tall, tmp_path / "cell.msh", medium=ThirdMedium())
     twist, X = 0.05, problem.nodes
     problem.strains.value[:] = [1, 0, 0, twist, 0, 0]

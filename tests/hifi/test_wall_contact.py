@@ -1,0 +1,251 @@
+"""Contact of walls over a plane: two quadratic sheets, a cell's gap, pressed cylinders, and a tangent brought up to date."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from base.materials import NeoHookean
+from geometry.cell import mesh_cell
+from hifi.cell import CellProblem
+from hifi.cell_system import CellSystem
+from hifi.contact_update import ContactUpdate
+from hifi.wall_contact import PenaltyLaw, WallPenalty, touching
+from tests.cases import CASES
+from tests.verification.pressed import pressed
+
+serial = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
+UP = np.array([0.0, 0.0, 1.0])
+LAW = PenaltyLaw(2.0, 0.02)
+
+
+class Sheet:
+    """A rectangle of `counts` x 2 quadratic triangles over x and y in +-size/2, z = height(x, y); down: seen from below."""
+
+    def __init__(self, counts, size, height, down=False):
+        n, m = counts
+        i, j = np.meshgrid(np.arange(2 * n + 1), np.arange(2 * m + 1), indexing="ij")
+        x, y = size[0] * (i / (2 * n) - 0.5), size[1] * (j / (2 * m) - 0.5)
+        self.nodes = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
+        a, b = np.meshgrid(2 * np.arange(n), 2 * np.arange(m), indexing="ij")
+
+        def at(di, dj):
+            return ((a + di) * (2 * m + 1) + b + dj).ravel()
+
+        lower = [at(0, 0), at(2, 0), at(0, 2), at(1, 0), at(1, 1), at(0, 1)]
+        upper = [at(2, 2), at(0, 2), at(2, 0), at(1, 2), at(1, 1), at(2, 1)]
+        self.facets = np.concatenate([np.stack(lower, axis=1), np.stack(upper, axis=1)])
+        if down:
+            self.facets = self.facets[:, [0, 2, 1, 5, 4, 3]]
+        self.areas = np.full(len(self.facets), size[0] * size[1] / len(self.facets))
+
+
+def sides(first, second, law=LAW):
+    """The Touching of both sides, None where nothing touches, and the (own, other) sheets of each."""
+    for own, other, direction in ((first, second, UP), (second, first, -UP)):
+        yield touching(own.nodes[own.facets], own.areas, other.nodes[other.facets], direction, law), own, other
+
+
+def energy(first, second):
+    return sum((t.area * t.energy).sum() for t, _, _ in sides(first, second) if t)
+
+
+def gradient(first, second):
+    """By the nodes of both sheets, one below the other, (n, 3)."""
+    out, start = np.zeros((len(first.nodes) + len(second.nodes), 3)), {id(first): 0, id(second): len(first.nodes)}
+    for t, own, other in sides(first, second):
+        if t:
+            nodes = np.concatenate([start[id(own)] + own.facets[t.facet], start[id(other)] + other.facets[t.other]], axis=1)
+            np.add.at(out, nodes, t.forces)
+    return out
+
+
+def moved(sheet, displacement):
+    copy = Sheet.__new__(Sheet)
+    copy.nodes, copy.facets, copy.areas = sheet.nodes + displacement, sheet.facets, sheet.areas
+    return copy
+
+
+def bumps(seed=1):
+    """Two curved, rough sheets of other meshes that overlap in the middle and are apart at their rims; the second lies aslant."""
+    rng = np.random.default_rng(seed)
+    first = Sheet((3, 4), (2.0, 2.0), lambda x, y: 0.1 - 0.2 * (x**2 + y**2))
+    second = Sheet((4, 3), (2.2, 2.1), lambda x, y: 0.02 + 0.1 * x + 0.05 * x * y, down=True)
+    return tuple(moved(s, rng.uniform(-0.01, 0.01, s.nodes.shape)) for s in (first, second))
+
+
+def test_the_law_is_the_derivative_of_its_energy_and_linear_beyond_its_onset():
+    overlap, h = np.array([-0.03, -0.01, 0.0, 0.013, 0.05]), 1e-6
+    value, pressure, slope = LAW(overlap)
+    up, down = LAW(overlap + h), LAW(overlap - h)
+    assert pressure == pytest.approx((up[0] - down[0]) / (2 * h), abs=1e-9)
+    assert slope == pytest.approx((up[1] - down[1]) / (2 * h), abs=1e-6)
+    assert value[0] == pressure[0] == slope[0] == 0.0
+    assert pressure[-1] == pytest.approx(LAW.stiffness * 0.05)
+
+
+def test_forces_are_the_gradient_of_the_energy_in_blended_edges_too():
+    first, second = bumps()
+    direction = np.random.default_rng(2).normal(size=(len(first.nodes) + len(second.nodes), 3))
+    h, n = 1e-6, len(first.nodes)
+    ends = [energy(moved(first, s * h * direction[:n]), moved(second, s * h * direction[n:])) for s in (1, -1)]
+    forces = gradient(first, second)
+    assert any(len(t.point) > len(t.area) for t, _, _ in sides(first, second))  # points between facets are among them
+    assert (forces * direction).sum() == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-6)
+    assert np.abs(forces).max() > 1e-3
+
+
+def test_both_walls_are_pushed_alike_and_flat_ones_not_sideways():
+    first, second = bumps()
+    forces = gradient(first, second)
+    assert forces.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-12)
+    assert forces[: len(first.nodes), 2].sum() > 1e-3  # the energy grows as the first wall goes up
+    flat = Sheet((3, 2), (2.0, 2.0), lambda x, y: 0 * x), Sheet((2, 4), (4.0, 4.0), lambda x, y: 0 * x - 0.05, down=True)
+    assert gradient(*flat)[:, :2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_flat_walls_of_other_meshes_carry_pressure_times_area_and_its_moment():
+    delta, size = 0.05, (2.0, 1.0)
+    first = Sheet((3, 2), size, lambda x, y: 0 * x)
+    second = Sheet((4, 5), size, lambda x, y: 0 * x - delta, down=True)
+    force = LAW.stiffness * delta * size[0] * size[1]
+    forces = gradient(first, second)
+    for sheet, f, sign in ((first, forces[: len(first.nodes)], 1), (second, forces[len(first.nodes) :], -1)):
+        assert f.sum(axis=0) == pytest.approx([0, 0, sign * force], rel=1e-12, abs=1e-12)
+        assert np.cross(sheet.nodes, f).sum(axis=0)[:2] == pytest.approx(np.zeros(2), abs=1e-12)
+
+
+def test_nothing_pushes_beyond_the_onset():
+    first = Sheet((3, 2), (2.0, 1.0), lambda x, y: 0 * x)
+    for distance, touches in ((1.01 * LAW.onset, False), (0.99 * LAW.onset, True)):
+        second = Sheet((4, 5), (2.0, 1.0), lambda x, y, z=distance: 0 * x + z, down=True)
+        assert [t is not None for t, _, _ in sides(first, second)] == [touches, touches]
+
+
+def test_bend_and_slope_make_the_tangent_away_from_blends():
+    """Under a single facet there is no neighbour to blend with."""
+    rng = np.random.default_rng(3)
+    first = Sheet((2, 2), (0.8, 0.8), lambda x, y: 0.05 - 0.1 * x**2)
+    first = moved(first, [-0.5, -0.5, 0.0] + rng.uniform(-0.01, 0.01, first.nodes.shape))
+    second = Sheet((1, 1), (4.0, 4.0), lambda x, y: 0.05 * (x + 0.5) * (y + 0.2), down=True)
+    second.facets, second.areas = second.facets[:1], second.areas[:1]
+
+    def side(u):
+        a, b = moved(first, u[: len(first.nodes)]), moved(second, u[len(first.nodes) :])
+        t = touching(a.nodes[a.facets], a.areas, b.nodes[b.facets], UP, LAW)
+        nodes = np.concatenate([a.facets[t.facet], len(a.nodes) + b.facets[t.other]], axis=1)
+        return t, nodes
+
+    rest = np.zeros((len(first.nodes) + len(second.nodes), 3))
+    direction, h = rng.normal(size=rest.shape), 1e-6
+    ends = []
+    for s in (1, -1):
+        t, nodes = side(s * h * direction)
+        f = np.zeros_like(rest)
+        np.add.at(f, nodes, t.forces)
+        ends.append(f)
+    t, nodes = side(rest)
+    d = direction[nodes].reshape(len(nodes), 36)
+    g = t.gradient.reshape(len(nodes), 36)
+    by_gap = (t.area * t.slope)[:, None] * g * np.einsum("cw,cw->c", g, d)[:, None]
+    bent = -t.push[:, None] * np.einsum("cvw,cw->cv", t.bend, d)
+    product = np.zeros_like(rest)
+    np.add.at(product, nodes, (by_gap + bent).reshape(-1, 12, 3))
+    assert np.abs(bent).max() > 1e-3 * np.abs(by_gap).max()
+    assert product == pytest.approx((ends[0] - ends[1]) / (2 * h), abs=1e-6 * np.abs(product).max())
+
+
+@pytest.fixture
+def pushed(tmp_path):
+    """A coarse cell whose walls are moved into each other, unevenly, at strains far from rest."""
+    segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.317))
+    mesh_cell(segment, 4.0, tmp_path / "cell.msh")
+    problem = CellProblem(segment, tmp_path / "cell.msh", contact=WallPenalty())
+    system = CellSystem(problem)
+    x = system.state.copy()
+    x[-6:] = [0.97, 0.01, -0.015, 0.012, 0.003, -0.002]
+    x[: problem.unknowns] = np.random.default_rng(4).normal(scale=2e-3, size=problem.unknowns)
+    for gap in problem.walls.gaps:
+        for (facets, _), sign in zip(gap, (1, -1)):
+            nodes = np.unique(facets)
+            X = problem.nodes[nodes]
+            towards = 0.5 * segment.gap / segment.sin * (1.0 - 0.02 * (X[:, 1] / 7.5) ** 2 - 0.01 * abs(X[:, 2]))
+            x[problem.reduced[problem.displacement_dofs[nodes, 0]]] += sign * towards
+    system.state = x
+    yield system
+    system.destroy()
+
+
+def along(system, direction, h):
+    """Contact's (energy, forces, slopes) at the state, moved by h times `direction` (unknowns + 6,)."""
+    kept, n = system.state, system.problem.unknowns
+    x = kept.copy()
+    x[:n] += h * direction[:n]
+    x[-6:] += h * direction[n:]
+    system.state = x
+    found = system.problem.contact.energy(), *system.problem.contact.residual()
+    system.state = kept
+    return found
+
+
+@serial
+def test_a_cell_s_contact_is_exact_in_unknowns_and_strains(pushed):
+    contact, n = pushed.problem.contact, pushed.problem.unknowns
+    forces, slope = contact.residual()
+    assert contact.overreach > 0 and np.abs(forces).max() > 1e-3
+    (rows, columns, values), mixed, curvature = contact.tangent()
+    K = sp.coo_matrix((values, (rows, columns)), shape=(n, n)).tocsr()
+    assert abs(K - K.T).max() < 1e-12 * abs(K).max()
+    assert curvature == pytest.approx(curvature.T, abs=1e-12 * abs(curvature).max())
+    rng, h = np.random.default_rng(5), 1e-7
+    # in blended edges, which the nodes' motions see and the strains' hardly, the tangent leaves out how the shares turn
+    moves = ((np.r_[rng.normal(size=n), np.zeros(6)], 2e-3), (np.r_[np.zeros(n), rng.normal(size=6) * [1, 1, 1, 0.1, 0.1, 0.1]], 1e-4))
+    for d, tolerance in moves:
+        up, down = along(pushed, d, h), along(pushed, d, -h)
+        energy, by_unknowns, by_strains = ((a - b) / (2 * h) for a, b in zip(up, down))
+        assert forces @ d[:n] + slope @ d[n:] == pytest.approx(energy, rel=1e-6)
+        for difference, product in ((by_unknowns, K @ d[:n] + mixed @ d[n:]), (by_strains, mixed.T @ d[:n] + curvature @ d[n:])):
+            assert np.linalg.norm(product - difference) < tolerance * np.linalg.norm(difference)
+
+
+@serial
+def test_pressed_cylinders_carry_the_exact_force_and_no_torque(tmp_path):
+    force, torque, state = pressed(tmp_path, 0.5)
+    assert force.relative_error < 5e-3
+    assert abs(torque) < 2e-3 * abs(force.computed)  # on a radius of 1 mm
+    assert state.contact.force == pytest.approx(-state.force[0], rel=1e-6)
+
+
+class Points:
+    """A stand-in for a system: K (n, n) and gaps with gradients (m, n) whose stiffnesses come and go."""
+
+    def __init__(self, n=12, m=7):
+        rng = np.random.default_rng(6)
+        A = rng.normal(size=(n, n))
+        self.bare, self.rows, self.right = A @ A.T + np.eye(n), rng.normal(size=(m, n)), rng.normal(size=n)
+
+    def matrix(self, stiffnesses):
+        return self.bare + sum(k * np.outer(self.rows[p], self.rows[p]) for p, k in stiffnesses.items())
+
+    def update(self, then):
+        K = np.linalg.inv(self.matrix(then))
+        update = ContactUpdate(then, most=5)
+        return (lambda now: update.renew(now, lambda points: self.rows[points], lambda b: K @ b)), lambda: update.corrected(K @ self.right)
+
+
+def test_an_updated_tangent_solves_as_one_factorised_anew():
+    points = Points()
+    renew, solution = points.update({0: 3.0, 1: 2.0, 2: 1.0})
+    for now in ({0: 3.0, 3: 2.0}, {0: 3.0, 3: 2.0, 4: 5.0, 1: 0.5}, {}):
+        assert renew(now) is True
+        assert solution() == pytest.approx(np.linalg.solve(points.matrix(now), points.right), rel=1e-9, abs=1e-12)
+        assert renew(now) is False
+
+
+def test_little_changes_are_left_alone_and_many_ask_for_a_factorisation():
+    points = Points()
+    renew, solution = points.update({0: 3.0, 1: 2.0})
+    before = solution()
+    assert renew({0: 3.0, 1: 1.99}) is False
+    assert (solution() == before).all()
+    assert renew({p: 1.0 for p in range(6)}) is None
