@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, contact, rod, segments, speed, verification
+from benchmarks import cell, chain, contact, paper, paper_page, rod, segments, speed, verification
 from benchmarks.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -30,6 +30,7 @@ PARTS = {
     "rod-fe": (rod.against_finite_elements, "rods with unit cells' laws against finite elements of three bodies; some 5 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by penalty; some 20 minutes"),
+    "paper": (paper.paper, "the paper's twisting and helical models beside unit cells, as they are and calibrated; some 8 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
     "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
     "scaling": (speed.scaling, "seconds of assembly, factorisation and solution on three meshes, and their exponents"),
@@ -83,6 +84,12 @@ MEANING = {
     "contact_parameter_sensitivity_rel": "twist at 50 kPa: change when the medium's stiffness is halved or doubled, over what contact adds",
     "contact_mesh_sensitivity_rel": "what contact adds to the twist at 50 kPa, h = 1.5 mm against 2 mm",
     "contact_force_check_rel": "force between chambers, 10, 30, 50 kPa, third medium against wall penalty: largest difference",
+    "analytic_vs_fe_twist_rel": "twisting tube, nothing fitted (E_t = 3 mu, equal areas), against cells twist-w10, -w12, -w15 with "
+    "contact, h = 2 mm, 30 .. 85 deg, 10 .. 50 kPa: median of |tau / tau of FE - 1|, 1 where the tube has no state; worst in paper-models.md",
+    "analytic_vs_fe_twist_rel_calibrated": "the same with E_t, Ri, Ro and the convention fitted to each case's cells",
+    "analytic_vs_fe_curvature_rel": "one-sided model, nothing fitted, against cells one-sided-w10, h = 2 mm, 30 .. 90 deg, 10 .. 50 kPa: "
+    "median of ||k| / |k| of FE - 1|",
+    "analytic_vs_fe_curvature_rel_calibrated": "the same with a factor on 1/mu and its power of 1/sin(angle) fitted to those cells",
     "long_segment_steps": "case one-sided-long, 26 chambers, 60 deg, 0-50 kPa, h = 2 mm: accepted steps",
     "long_segment_factorisations": "the same: factorisations, failed attempts included",
     "ramp_ratio_same_strategy_h2": "ramp twist-w12 at h = 2 mm, same predictor and lagging: our time over the faster of FElupe and NGSolve",
@@ -147,6 +154,8 @@ def snapshot():
         lines.append(f"| {part} | {m['date']} | {m['revision']} | {where} | {m['calibration_seconds']:.3f} |")
     write_text(ROOT / "docs" / "figures.md", "\n".join(lines) + "\n")
     write_text(ROOT / "docs" / "speed.md", speed.page(results, meta))
+    if "paper" in meta:
+        write_text(ROOT / "docs" / "paper-models.md", paper_page.page(meta, ROOT / "docs"))
     if "verification" in meta:
         write_text(ROOT / "docs" / "verification.md", verification.page(meta, ROOT / "docs"))
 

@@ -79,7 +79,7 @@ def calibrate_tube(curves, start, radii=True):
         found = candidate(x)
         return np.inf if found is None else found.tau_error**2 + found.stretch_error**2
 
-    grid = [np.array([modulus, ratio][: 1 + radii]) for modulus in np.log(MODULI) for ratio in (RATIOS if radii else RATIOS[:1])]
+    grid = [np.array([m, r]) for m in np.log(MODULI) for r in RATIOS] if radii else np.log(np.geomspace(*MODULI[[0, -1]], 30))[:, None]
     best = minimize(cost, min(grid, key=cost), method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-8, "maxfev": 150})
     return candidate(best.x)
 
