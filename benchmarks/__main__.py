@@ -85,7 +85,7 @@ MEANING = {
     "contact_mesh_sensitivity_rel": "what contact adds to the twist at 50 kPa, h = 1.5 mm against 2 mm",
     "contact_force_check_rel": "force between chambers, 10, 30, 50 kPa, third medium against wall penalty: largest difference",
     "analytic_vs_fe_twist_rel": "twisting tube, nothing fitted (E_t = 3 mu, equal areas), against cells twist-w10, -w12, -w15 with "
-    "contact, h = 2 mm, 30 .. 85 deg, 10 .. 50 kPa: median of |tau / tau of FE - 1|, 1 where the tube has no state; worst in paper-models.md",
+    "contact, h = 2 mm, 30 .. 85 deg, 10 .. 50 kPa: median of |tau / tau of FE - 1|, 1 where the tube has no state; worst: paper-models.md",
     "analytic_vs_fe_twist_rel_calibrated": "the same with E_t, Ri, Ro and the convention fitted to each case's cells",
     "analytic_vs_fe_curvature_rel": "one-sided model, nothing fitted, against cells one-sided-w10, h = 2 mm, 30 .. 90 deg, 10 .. 50 kPa: "
     "median of ||k| / |k| of FE - 1|",
