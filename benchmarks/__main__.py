@@ -30,7 +30,7 @@ PARTS = {
     "rod-fe": (rod.against_finite_elements, "rods with unit cells' laws against finite elements of three bodies; some 5 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by penalty; some 20 minutes"),
-    "paper": (paper.paper, "the paper's twisting and helical models beside unit cells, as they are and calibrated; some 8 minutes"),
+    "paper": (paper.paper, "the paper's twisting and helical models beside unit cells, as they are and calibrated; some 10 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
     "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
     "scaling": (speed.scaling, "seconds of assembly, factorisation and solution on three meshes, and their exponents"),
