@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, contact, law, rod, segments, speed, verification
+from benchmarks import cell, chain, contact, law, paper, paper_page, rod, segments, speed, verification
 from benchmarks.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -31,6 +31,7 @@ PARTS = {
     "law": (law.law, "the trained law that comes along: errors on designs it has not seen, the laws compared, cost; some 3 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by third medium; 15 minutes"),
+    "paper": (paper.paper, "the paper's twisting and helical models beside unit cells, as they are and calibrated; some 10 minutes"),
     "long": (chain.long_segment, "steps and factorisations of the case one-sided-long; some 2 minutes"),
     "speed": (speed.ramps, "the same ramp in pneunet, FElupe and NGSolve (installs them on first use); some 15 minutes"),
     "scaling": (speed.scaling, "seconds of assembly, factorisation and solution on three meshes, and their exponents"),
@@ -100,6 +101,12 @@ MEANING = {
     "contact_force_check_rel": "force between chambers, 10, 30, 50 kPa, walls against a third medium in its limit: largest difference",
     "contact_pressed_force_rel": "cylinders pressed together, each turned against the next, h = 0.35 radii: error of the axial force",
     "contact_segment_vs_cell_rel": "twist in the middle of 5 pairs of chambers, 2 ranks, against the cell, both with contact",
+    "analytic_vs_fe_twist_rel": "twisting tube, nothing fitted (E_t = 3 mu, equal areas), against cells twist-w10, -w12, -w15 with "
+    "contact, h = 2 mm, 30 .. 85 deg, 10 .. 50 kPa: median of |tau / tau of FE - 1|, 1 where the tube has no state; worst: paper-models.md",
+    "analytic_vs_fe_twist_rel_calibrated": "the same with E_t, Ri, Ro and the convention fitted to each case's cells",
+    "analytic_vs_fe_curvature_rel": "one-sided model, nothing fitted, against cells one-sided-w10, h = 2 mm, 30 .. 90 deg, 10 .. 50 kPa: "
+    "median of ||k| / |k| of FE - 1|",
+    "analytic_vs_fe_curvature_rel_calibrated": "the same with a factor on 1/mu and its power of 1/sin(angle) fitted to those cells",
     "long_segment_steps": "case one-sided-long, 26 chambers, 60 deg, 0-50 kPa, h = 2 mm: accepted steps",
     "long_segment_factorisations": "the same: factorisations, failed attempts included",
     "ramp_ratio_same_strategy_h2": "ramp twist-w12 at h = 2 mm, same predictor and lagging: our time over the faster of FElupe and NGSolve",
@@ -167,6 +174,8 @@ def snapshot():
     if "law" in meta:
         page = ROOT / "docs" / "rod-law.md"
         write_text(page, law.page(page.read_text(), meta["law"]["details"]))
+    if "paper" in meta:
+        write_text(ROOT / "docs" / "paper-models.md", paper_page.page(meta, ROOT / "docs"))
     if "verification" in meta:
         write_text(ROOT / "docs" / "verification.md", verification.page(meta, ROOT / "docs"))
 

@@ -37,14 +37,14 @@ def _minimise(potential, x, pressure, iterations=30):
     return None
 
 
-def follow(potential, pressures):
-    """States (n, unknowns) at increasing `pressures` (n,) >= 0 in MPa, each reached from the one before.
+def states(potential, pressures):
+    """Yield the state (unknowns,) at each of the increasing `pressures` (n,) >= 0 in MPa, reached from the one before.
 
     `potential` has `start` (the unloaded state), `scale` (size of the energy), `admissible(x)`, and `energy(x)` and
     `volume(x)`, each returning value, gradient and Hessian in unknowns of order 1. A step in pressure that finds no
     minimum close by is halved; ConvergenceError names the pressure reached when the branch of minima ends.
     """
-    states, x, reached, step = [], potential.start, 0.0, np.inf
+    x, reached, step = potential.start, 0.0, np.inf
     for pressure in pressures:
         while reached < pressure:
             trial = min(pressure, reached + step)
@@ -60,5 +60,10 @@ def follow(potential, pressures):
                     f"(asked for {pressure * 1e3:.4g} kPa): a limit load of this "
                     "model; lower the pressure or make the walls thicker"
                 )
-        states.append(x)
-    return np.array(states).reshape(len(states), potential.start.size)
+        yield x
+
+
+def follow(potential, pressures):
+    """All of `states` as an array (n, unknowns)."""
+    found = list(states(potential, pressures))
+    return np.array(found).reshape(len(found), potential.start.size)

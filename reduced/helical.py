@@ -197,8 +197,11 @@ class HelicalCell:
 
     def strains(self, pressures):
         """e and k, each (n, 3), at increasing pressures (n,) in MPa; ConvergenceError at a limit load."""
-        x = follow(self, pressures)
-        e, k = np.zeros((2, len(pressures), 3))
+        return self.rod_strains(follow(self, pressures))
+
+    def rod_strains(self, x):
+        """e and k, each (n, 3), of unknowns (n, SIZE)."""
+        e, k = np.zeros((2, len(x), 3))
         e[:, 0], e[:, 1] = x[:, INDEX["M11"]], x[:, INDEX["M12"]]
         k[:, 0], k[:, 1] = -x[:, INDEX["K12"]] / self.cell.core_height, x[:, INDEX["K11"]] / self.cell.core_height
         return e, k
