@@ -194,7 +194,7 @@ def first_touch(states):
     for before, last, pushing in zip([None, *free], free, free[1:]):
         if pushing["contact_force"] > 0:
             if before is None:
-                return last["pressure"]
+                return pushing["pressure"]
             rate = (before["wall_distance"] - last["wall_distance"]) / (last["pressure"] - before["pressure"])
             gone = last["wall_distance"] / rate if rate > 0 else np.inf
             return float(min(last["pressure"] + gone, pushing["pressure"]))

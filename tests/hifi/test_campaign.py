@@ -83,23 +83,16 @@ def test_prescribed_strains_take_the_energy_they_are_told():
     assert q + prescribed_change(q, K, twofold.amplitude, twofold.direction) == pytest.approx([1.2, 0.04, 0, 0.06, 0.4, 0])
 
 
-def test_first_touch_is_where_the_wall_distance_passes_zero():
-    states = [{"kind": "free", "pressure": p, "wall_distance": d} for p, d in ((0.0, 1.0), (0.1, 0.25), (0.2, -0.25), (0.3, -0.5))]
-    assert first_touch(states) == pytest.approx(0.15)
-    assert first_touch(states[:2]) is None and first_touch([{**s, "wall_distance": None} for s in states]) is None
+def test_first_touch_lies_where_the_wall_distance_would_pass_zero_and_before_walls_push():
+    def free(pressure, distance, force=0.0):
+        return {"kind": "free", "pressure": pressure, "wall_distance": distance, "contact_force": force}
 
+    open_ones = [free(0.0, 0.5), free(0.1, 0.2)]
+    assert first_touch([*open_ones, free(0.2, 0.001, 0.3)]) == pytest.approx(0.1 + 0.2 / 3)
+    assert first_touch([*open_ones, free(0.12, 0.001, 0.3)]) == pytest.approx(0.12)
+    assert first_touch([free(0.0, 0.5), free(0.1, 0.001, 0.3)]) == 0.1
+    assert first_touch(open_ones) is None and first_touch([]) is None
 
-@pytest.mark.parametrize(
-    "text, message",
-    [
-        ("design = 3", "designs"),
-        ("designs = 0", "designs = 0 must lie in"),
-        ('kinds = ["both"]', "'one-sided', 'twisting'"),
-        ('[[mesh]]\nname = "a"', "mesh_size_mm' is missing"),
-        ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
-        ("[ranges.one-sided]\nangle_deg = [10, 20]", "outside 30..150"),
-    ],
-)
 def test_a_slip_in_the_file_is_named(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         campaign(tmp_path, text)
