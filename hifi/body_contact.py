@@ -85,7 +85,7 @@ class BodyContact:
     def gradients(self, points):
         """(m, owned dofs): how the gaps of points that push, or did so at the last tangent, change."""
         places, parts = {p: i for i, p in enumerate(points)}, {}
-        for side in [*self._then, *self._now]:
+        for side in [*self._now, *self._then]:  # what is taken away was put in as it was then
             chosen = [(places[p], row) for row, p in enumerate(side.touching.stiffnesses(side.number)) if p in places]
             if chosen:
                 to, of = np.array(chosen).T

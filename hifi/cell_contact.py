@@ -90,7 +90,7 @@ class CellContact:
         """(m, unknowns + 6): how the gaps of points that push, or did so at the last tangent, change with unknowns and strains."""
         out = np.zeros((len(points), self.problem.unknowns + 6))
         places = {p: i for i, p in enumerate(points)}
-        for side in [*self._then, *self._now]:
+        for side in [*self._now, *self._then]:  # what is taken away was put in as it was then
             rows = [(places[p], row) for row, p in enumerate(side.touching.stiffnesses(side.number)) if p in places]
             if rows:
                 to, of = np.array(rows).T

@@ -10,6 +10,8 @@ from base.strains import RodStrains
 from hifi.contact_update import ContactUpdate
 from hifi.solver import DirectSolver
 
+#: of the gap: an overlap at which contact has failed
+TOO_DEEP = 0.05
 #: of mu pitch^2, the size of the forces in a cell
 RELATIVE_TOLERANCE = 1e-9
 
@@ -20,7 +22,8 @@ class CellState:
 
     stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure in MPa;
     unstable: directions in which the cell is unstable at this pressure (its free strains included). wall_distance: smallest
-    signed distance (mm) of neighbouring chambers' walls; walls_overlap: it is negative and there was no contact model.
+    signed distance (mm) of neighbouring chambers' walls, `gap` that at rest; walls_overlap: it is negative and there was no contact
+    model, or one that has failed to hold them apart.
     contact: hifi.walls.WallContact of the gap with the largest force, None without contact. array: the mixed state of the
     problem (hifi.cell), what pictures and checks are made of. steps, factorisations in them and seconds: what it took to come
     here from rest (hifi.cell_run).
@@ -35,6 +38,7 @@ class CellState:
     unstable: int
     largest_stretch: float
     wall_distance: float
+    gap: float = np.inf
     contact: object = None
     array: np.ndarray | None = field(default=None, repr=False)
     steps: int = 0
@@ -54,7 +58,7 @@ class CellState:
 
     @property
     def walls_overlap(self):
-        return self.wall_distance < 0 and self.contact is None
+        return self.wall_distance < (0.0 if self.contact is None else -TOO_DEEP * self.gap)
 
     @property
     def kirchhoff_stiffness(self):
@@ -228,6 +232,7 @@ class CellSystem:
             self.unstable,
             self.problem.stretch.largest(),
             self.walls.distance(),
+            self.problem.segment.gap if self.walls.gaps else np.inf,
             self.problem.measure_contact(),
             self.problem.state.x.array.copy(),
         )

@@ -108,10 +108,11 @@ class Newton:
             system.load += load_step
             before = system.overreach
             new, new_norm, new_scale = self.residual()
+            deepest = max(1.0, before)
             for _ in range(SHORTENINGS):
-                if system.overreach <= 1.0 and np.isfinite(new_norm):
+                if system.overreach <= deepest and np.isfinite(new_norm):
                     break
-                fraction = (1.0 - before) / (system.overreach - before) if np.isfinite(new_norm) else 0.3
+                fraction = (deepest - before) / (system.overreach - before) if np.isfinite(new_norm) else 0.3
                 fraction = min(max(fraction, 0.1), 0.7)
                 step, load_step = fraction * step, fraction * load_step
                 system.state, system.load = system.moved(state, step), load + load_step
