@@ -33,8 +33,8 @@ length_mm = 25.0
 COMMANDS = ("design", "shape", "mesh", "solve", "report", "fit-material", "run", "doctor")
 STEPS = [
     "step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
-    "smallest_wall_distance_mm", "walls_overlap", "body_distance_mm", "body_overlap", "contact_force_N", "largest_stretch", "unstable_directions",
-    "dead_load_fraction", "stability_factorisations", "seconds",
+    "smallest_wall_distance_mm", "walls_overlap", "body_distance_mm", "body_overlap", "contact_force_N", "largest_stretch",
+    "unstable_directions", "dead_load_fraction", "stability_factorisations", "seconds",
 ]  # fmt: skip
 MARKS = ["walls_overlap", "body_overlap"]
 CENTRELINES = ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm", *MARKS]
