@@ -20,6 +20,8 @@ from hifi.walls import distances_from
 _SLABS = 8
 #: points whose winding number is computed at once; the deepest come first and the first that is inside ends the search
 _AT_ONCE = 32
+#: mm and slabs; planes of nodes stand where slabs begin, and must not change sides with the rounding of another number of ranks
+_ROUNDING = 1e-6
 
 
 class BodyDistance:
@@ -48,11 +50,11 @@ class BodyDistance:
         _, self._first, self._facets = np.unique(np.round(X.reshape(-1, 3), 6), axis=0, return_index=True, return_inverse=True)
         self._facets = self._facets.reshape(-1, 6)
         x = X.reshape(-1, 3)[self._first, 0]
-        number = np.floor(_SLABS * x / self.apart)
+        number = np.floor(_SLABS * x / self.apart + _ROUNDING)
         self._slabs = [np.flatnonzero(number == n) for n in np.unique(number)]
         self._low, self._high = (np.array([f(x[slab]) for slab in self._slabs]) for f in (np.min, np.max))
         self._facet_low, self._facet_high = x[self._facets].min(axis=1), x[self._facets].max(axis=1)
-        self._pairs = np.argwhere(self._low[None, :] - self._high[:, None] >= self.apart)
+        self._pairs = np.argwhere(self._low[None, :] - self._high[:, None] >= self.apart - _ROUNDING)
 
     def smallest(self, array=None):
         """Signed distance in mm, on rank 0 (None elsewhere); inf for a body too short to have far parts."""
@@ -97,7 +99,7 @@ class BodyDistance:
         if not len(points):
             return np.inf
         others = others[cKDTree(x[points]).query(x[others], distance_upper_bound=within + 2 * reach)[0] <= within + 2 * reach]
-        far = (self._facet_low - self._high[a] >= self.apart) | (self._low[a] - self._facet_high >= self.apart)
+        far = (self._facet_low - self._high[a] >= self.apart - _ROUNDING) | (self._low[a] - self._facet_high >= self.apart - _ROUNDING)
         wall = far & np.isin(self._facets, others).any(axis=1)
         if not wall.any():
             return np.inf

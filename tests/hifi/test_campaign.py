@@ -93,6 +93,18 @@ def test_first_touch_lies_where_the_wall_distance_would_pass_zero_and_before_wal
     assert first_touch([free(0.0, 0.5), free(0.1, 0.001, 0.3)]) == 0.1
     assert first_touch(open_ones) is None and first_touch([]) is None
 
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("design = 3", "designs"),
+        ("designs = 0", "designs = 0 must lie in"),
+        ('kinds = ["both"]', "'one-sided', 'twisting'"),
+        ('[[mesh]]\nname = "a"', "mesh_size_mm' is missing"),
+        ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
+        ("[ranges.one-sided]\nangle_deg = [10, 20]", "outside 30..150"),
+    ],
+)
 def test_a_slip_in_the_file_is_named(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         campaign(tmp_path, text)
