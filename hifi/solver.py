@@ -18,25 +18,35 @@ class DirectSolver:
     """MUMPS factorisation of a PETSc matrix: LDL^T when symmetric (a closed cavity), LU otherwise."""
 
     def __init__(self, matrix, comm, symmetric=True):
-        self.matrix, self.symmetric, self.factorisations = matrix, symmetric, 0
-        self.ksp = PETSc.KSP().create(comm)
+        self.matrix, self.comm, self.symmetric, self.factorisations = matrix, comm, symmetric, 0
+        self._solution, self._right = matrix.createVecs()
+        self._set_up()
+
+    def _set_up(self):
+        self.ksp = PETSc.KSP().create(self.comm)
         self.ksp.setType("preonly")
         pc = self.ksp.getPC()
-        pc.setType("cholesky" if symmetric else "lu")
+        pc.setType("cholesky" if self.symmetric else "lu")
         pc.setFactorSolverType("mumps")
-        self.ksp.setOperators(matrix)
+        self.ksp.setOperators(self.matrix)
         pc.setFactorSetUpSolverType()
-        self._solution, self._right = matrix.createVecs()
         factor = pc.getFactorMatrix()
         factor.setMumpsIcntl(7, 5)  # metis, where this MUMPS has it; Debian 12 takes its own choice (PORD) all the same
-        if symmetric:
+        if self.symmetric:
             factor.setMumpsIcntl(12, 2)  # ordering of the graph compressed by 2x2 pivots: 7 % fewer operations
         factor.setMumpsIcntl(14, 60)  # workspace for pivoting, in percent
         factor.setMumpsIcntl(24, 1)  # a singular pivot is told, not a crash
-        if symmetric and comm.size > 1:
+        if self.symmetric and self.comm.size > 1:
             factor.setMumpsIcntl(13, 1)  # the root is not left to ScaLAPACK, which counts no negative pivots
+        self._nonzeros = self._count()
+
+    def _count(self):
+        return self.matrix.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
 
     def factorise(self):
+        if self._count() != self._nonzeros:  # for a new pattern PETSc makes a new factor, without what was set above
+            self.ksp.destroy()
+            self._set_up()
         self.ksp.setOperators(self.matrix)
         self.ksp.setUp()
         self.factorisations += 1
