@@ -4,6 +4,7 @@ Run by `make demo`; each link is the command a user would type.
 """
 
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -24,6 +25,7 @@ def step(*arguments, may_stop_short=False):
 def main():
     started = time.perf_counter()
     design = str(OUT / "design.toml")
+    shutil.rmtree(ROOT / OUT / "solve", ignore_errors=True)  # an earlier design's, perhaps an earlier version's
     step("design", "examples/targets/octopus.toml", "-o", str(OUT))
     step("shape", design)
     step("mesh", design)
