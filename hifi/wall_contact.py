@@ -108,8 +108,8 @@ def mean_normal(facets):
 def touching(points, areas, wall, direction, law, share=0.5):
     """The Touching of the Gauss points of facets `points` (n, 6, 3), undeformed areas (n,), on the `wall` (m, 6, 3) that lies in
     `direction` (3,); None where nothing comes closer than the law's onset."""
-    if not len(points) or not len(wall):
-        return None
+    if not len(points) or not len(wall) or not (np.isfinite(points).all() and np.isfinite(wall).all()):
+        return None  # a state that has diverged has a residual that says so
     heights = wall @ direction
     x = np.einsum("qn,fni->fqi", _GAUSS, points)
     above = x @ direction
