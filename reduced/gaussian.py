@@ -27,20 +27,34 @@ ROWS = 256
 class GaussianProcess:
     """Means of p outputs at inputs of d numbers, which are shifted by `shift` and divided by `width` first.
 
-    scales (d,): of the kernel, in those units; points (m, d): in units of the scales too; weights (m + 1 + d, p): of the kernels
-    at the points, the constant and the slopes. root (m + 1 + d, same): triangular factor for the deviation, as if every
-    output were as noisy as the first; variance (p,): each output's prior variance.
+    observed (n, d): inputs of the observations in those units, the `inducing` (m) first; group (n,), trust (n,): of `fit`, of the
+    first output. scales (d,): of the kernel, in those units too; weights (m + 1 + d, p): of the kernels at the inducing points, the
+    constant and the slopes; variance (p,): each output's prior variance.
     """
 
     shift: np.ndarray
     width: np.ndarray
+    observed: np.ndarray
+    group: np.ndarray
+    inducing: int
+    trust: np.ndarray
     scales: np.ndarray
-    points: np.ndarray
     weights: np.ndarray
-    root: np.ndarray
     variance: np.ndarray
     noise: float
     common_noise: float
+
+    @cached_property
+    def points(self):
+        """(m, d) inducing points in units of the scales."""
+        return self.observed[: self.inducing] / self.scales
+
+    @cached_property
+    def _root(self):
+        """(m + 1 + d, same) triangular factor for the deviation, as if every output were as noisy as the first: found when asked for,
+        since it is ten times the size of all the rest."""
+        system = _System(self.observed, self.group, self.inducing, self.scales, self.noise, self.common_noise)
+        return qr(system.rows(self.trust[:, None]), mode="r")[0][: len(self.weights)]
 
     @cached_property
     def _kernel_root(self):
@@ -71,7 +85,7 @@ class GaussianProcess:
         kernel = _kernel(z / self.scales, self.points)
         basis = np.hstack([kernel, np.ones((len(x), 1)), z])
         missed = 1 - (solve_triangular(self._kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
-        known = self.noise * (solve_triangular(self.root, basis.T, trans="T") ** 2).sum(axis=0)
+        known = self.noise * (solve_triangular(self._root, basis.T, trans="T") ** 2).sum(axis=0)
         return np.sqrt((known + np.maximum(missed, 0))[:, None] * self.variance)
 
 
@@ -117,7 +131,8 @@ def fit(x, y, group, trust=None, most=500, inducing=1000, seed=0, like=None):
     z, order = (x - shift) / width, np.random.default_rng(seed).permutation(len(x))
     if like is not None:
         shift, width = like.shift, like.width
-        return _condition((x - shift) / width, y, group, trust, order[:inducing], shift, width, like.scales, like.noise, like.common_noise)
+        found = like.scales, like.noise, like.common_noise
+        return _condition((x - shift) / width, y, group, trust, order, inducing, shift, width, *found)
     some = order[:most]
     data = [(y[np.ix_(some, g)], trust[some, g[0]]) for g in _alike(trust)]
     centred = [(v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum(), 1 / t) for v, t in data]
@@ -131,7 +146,7 @@ def fit(x, y, group, trust=None, most=500, inducing=1000, seed=0, like=None):
         bounds=[LOG_SCALE] * z.shape[1] + [LOG_NOISE] * 2,
         options={"maxiter": 100},
     )
-    return _condition(z, y, group, trust, order[:inducing], shift, width, np.exp(found.x[:-2]), *np.exp(found.x[-2:]).tolist())
+    return _condition(z, y, group, trust, order, inducing, shift, width, np.exp(found.x[:-2]), *np.exp(found.x[-2:]).tolist())
 
 
 def _alike(trust):
@@ -142,26 +157,37 @@ def _alike(trust):
     return list(groups.values())
 
 
-def _condition(z, y, group, trust, chosen, shift, width, scales, noise, common_noise):
-    points, (d, p) = z[chosen] / scales, (z.shape[1], y.shape[1])
-    m = len(points)
-    basis = np.hstack([_kernel(z / scales, points), np.ones((len(z), 1)), z])
-    kernel_root = cholesky(_kernel(points, points) + JITTER * np.eye(m), lower=True)
-    prior = np.zeros((m + 1 + d, m + 1 + d))
-    prior[:m, :m], prior[m:, m:] = kernel_root.T, np.eye(1 + d) / np.sqrt(TREND)
-    weights, variance, roots = np.zeros((m + 1 + d, p)), np.zeros(p), []
-    white = _whitener(group, common_noise / noise)
+class _System:
+    """Least-squares rows of observations at z (n, d), the first m of which are the inducing points, and of the prior."""
+
+    def __init__(self, z, group, m, scales, noise, common_noise):
+        points, d = z[:m] / scales, z.shape[1]
+        kernel_root = cholesky(_kernel(points, points) + JITTER * np.eye(len(points)), lower=True)
+        self.basis = np.hstack([_kernel(z / scales, points), np.ones((len(z), 1)), z])
+        self.prior = np.zeros((self.basis.shape[1],) * 2)
+        self.prior[: len(points), : len(points)], self.prior[len(points) :, len(points) :] = kernel_root.T, np.eye(1 + d) / np.sqrt(TREND)
+        self.white, self._noise = _whitener(group, common_noise / noise), noise
+
+    def rows(self, trust):
+        """(n + m + 1 + d, m + 1 + d) for observations of this trust (n, 1)."""
+        return np.vstack([self.white(trust * self.basis), np.sqrt(self._noise) * self.prior])
+
+
+def _condition(z, y, group, trust, order, inducing, shift, width, scales, noise, common_noise):
+    z, y, group, trust, m = z[order], y[order], group[order], trust[order], min(inducing, len(z))
+    system = _System(z, group, m, scales, noise, common_noise)
+    weights, variance = np.zeros((system.basis.shape[1], y.shape[1])), np.zeros(y.shape[1])
     for columns in _alike(trust):
         t = trust[:, columns[0]][:, None]
         shifted = (t**2 * y[:, columns]).sum(axis=0) / (t**2).sum()
-        left, right = white(t * basis), white(t * (y[:, columns] - shifted))
-        q, r = qr(np.vstack([left, np.sqrt(noise) * prior]), mode="economic")
+        right = system.white(t * (y[:, columns] - shifted))
+        q, r = qr(system.rows(t), mode="economic")
         w = solve_triangular(r, q[: len(z)].T @ right)
-        variance[columns] = (((right - left @ w) ** 2).sum(axis=0) / noise + ((prior @ w) ** 2).sum(axis=0)) / len(z)
+        missed = right - system.white(t * system.basis) @ w
+        variance[columns] = ((missed**2).sum(axis=0) / noise + ((system.prior @ w) ** 2).sum(axis=0)) / len(z)
         w[m] += shifted
         weights[:, columns] = w
-        roots.append(r)
-    return GaussianProcess(shift, width, scales, points, weights, roots[0], variance, noise, common_noise)
+    return GaussianProcess(shift, width, z, group, m, trust[:, 0], scales, weights, variance, noise, common_noise)
 
 
 def _whitener(group, ratio):

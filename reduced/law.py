@@ -21,7 +21,7 @@ from reduced.law_coordinates import LENGTHS, Coordinates, cosine
 from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, whitening
 
-SCHEMA = "pneunet-law-1"
+SCHEMA = "pneunet-law-2"
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so
 TIE_TOLERANCE = 0.02
 #: lowest P/mu: the free strains are divided by it
@@ -244,21 +244,27 @@ def _ties(segment):
 # ---- files
 
 
+#: fields of the Gaussian processes side by side that are the same in all of them
+COMMON = ("shift", "width", "observed", "group", "inducing")
+NUMBERS = {"noise": float, "common_noise": float, "inducing": int}
+
+
 def write_law(path, law):
-    """Write a RodLaw (.npz); numbers for deviations in single precision."""
+    """Write a RodLaw (.npz)."""
     arrays = {}
     for kind, k in law.kinds.items():
         for name in ("strains", "stiffness"):
             for number, process in enumerate(getattr(k, name).processes):
                 for f in fields(GaussianProcess):
-                    value = np.asarray(getattr(process, f.name))
-                    if f.name == "root":  # of the stiffness nobody asks the deviation
-                        value = value[np.triu_indices(len(value))].astype("f4")[: 0 if name == "stiffness" else None]
-                    arrays[f"{kind}/{name}/{number}/{f.name}"] = value
+                    arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name))
         arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
         arrays |= {f"{kind}/coefficients": k.anharmonic.coefficients, f"{kind}/reach": np.asarray(k.anharmonic.reach)}
     about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": {k: list(v) for k, v in LENGTHS.items()}, **law.about}
-    write_archive(path, SCHEMA, about, arrays)
+    write_archive(path, SCHEMA, about, arrays, compress=True)
+
+
+def _key(kind, name, number, field):
+    return f"{kind}/{name}/{field}" if field in COMMON else f"{kind}/{name}/{number}/{field}"
 
 
 def read_law(path, name=None):
@@ -267,21 +273,13 @@ def read_law(path, name=None):
         return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about, name or str(path))
 
 
-def _triangle(flat):
-    """Upper triangular matrix of its entries, row by row."""
-    n = round((np.sqrt(8 * len(flat) + 1) - 1) / 2)
-    full = np.zeros((n, n))
-    full[np.triu_indices(n)] = flat
-    return full
-
-
 def _read_kind(stored, kind):
     processes = {}
     for name in ("strains", "stiffness"):
         processes[name], number = [], 0
         while f"{kind}/{name}/{number}/noise" in stored:
-            values = {f.name: stored[f"{kind}/{name}/{number}/{f.name}"] for f in fields(GaussianProcess)}
-            values |= {one: float(values[one]) for one in ("noise", "common_noise")} | {"root": _triangle(values["root"])}
+            values = {f.name: stored[_key(kind, name, number, f.name)] for f in fields(GaussianProcess)}
+            values |= {field: number_type(values[field]) for field, number_type in NUMBERS.items()}
             processes[name].append(GaussianProcess(**values))
             number += 1
     processes = {name: SideBySide(tuple(found)) for name, found in processes.items()}
