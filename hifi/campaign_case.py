@@ -24,6 +24,7 @@ from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath, PathState
 from hifi.solver import NotConverged
 from hifi.stepping import StepSize, run_steps
+from hifi.touch import Load, TouchWatch
 from hifi.wall_contact import WallPenalty
 
 STATES = "states.json"
@@ -188,17 +189,12 @@ class Sampler:
 
 
 def first_touch(states):
-    """Pressure (MPa) between the last free state whose walls do not push at each other and the next, where the distance that the two
-    before it lose goes to zero; None where no walls push."""
-    free = [s for s in states if s["kind"] == "free"]
-    for before, last, pushing in zip([None, *free], free, free[1:]):
-        if pushing["contact_force"] > 0:
-            if before is None:
-                return pushing["pressure"]
-            rate = (before["wall_distance"] - last["wall_distance"]) / (last["pressure"] - before["pressure"])
-            gone = last["wall_distance"] / rate if rate > 0 else np.inf
-            return float(min(last["pressure"] + gone, pushing["pressure"]))
-    return None
+    """Pressure (MPa) at which walls touch on the way through the free states (hifi.touch); None where they do not."""
+    watch, met = TouchWatch(), None
+    for s in states:
+        if s["kind"] == "free":
+            met = watch.see(Load(s["pressure"]), s["wall_distance"], contact_force=s["contact_force"]).walls_from
+    return met and met.pressure
 
 
 def prescribed_change(q, stiffness, amplitude, direction):

@@ -20,7 +20,8 @@ from hifi.control import LoadControl, VolumeControl
 from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath
 from hifi.results import KPA, limit_table, limit_text
-from hifi.stepping import StepSize, lagrange_coefficients, run_steps
+from hifi.stepping import StepSize, run_steps
+from hifi.touch import Load, TouchWatch
 from hifi.wall_picture import draw_cell
 
 #: iterations that a lagged tangent may still need in contact, where tangents age fast
@@ -48,8 +49,7 @@ def _follow(case, problem, on_state, on_limit_point, on_touch):
     if medium:
         options.patience = CONTACT_PATIENCE
     system = CellSystem(problem)
-    distances = [(0.0, system.walls.distance())]
-    last, passed = [], 0
+    watch, touched, last, passed = TouchWatch(), False, [], 0
     effort, started = {"steps": 0, "factorisations": 0, "seconds": 0.0}, time.perf_counter()
 
     def spend(step):
@@ -58,11 +58,13 @@ def _follow(case, problem, on_state, on_limit_point, on_touch):
         effort["seconds"] = time.perf_counter() - started
 
     def look():
-        """Tell of the first touch. A medium pushes long before it."""
-        if distances[-1][1] > 0 and not medium:
-            distances.append((problem.pressure.value.item(), system.walls.distance() if not system.overreach else 0.0))
-            if distances[-1][1] <= 0:
-                on_touch(_first_touch(distances))
+        """Tell of the first touch, once. A medium pushes long before it."""
+        nonlocal touched
+        if not touched and not medium:
+            met = watch.see(Load(problem.pressure.value.item()), system.walls.distance(), contact_force=system.overreach).walls_from
+            if met:
+                touched = True
+                on_touch(met.pressure)
 
     def record():
         kept = system.state.copy()
@@ -74,6 +76,7 @@ def _follow(case, problem, on_state, on_limit_point, on_touch):
         on_state(last[0])
 
     try:
+        look()
         record()
         rest = system.volume()
         if case.control == "volume":
@@ -104,19 +107,6 @@ def _follow(case, problem, on_state, on_limit_point, on_touch):
         return last[0]
     finally:
         system.destroy()
-
-
-def _first_touch(known):
-    """Pressure at which the wall distance passes zero, from (pressure, distance) of which the last is the first that is not above.
-
-    Without contact an interpolation, with it an extrapolation of the three before: the last says no more than that walls touch, but
-    close to it, for the path takes no step across a deep overlap.
-    """
-    pressures, gaps = np.array(known[-3:] if known[-1][1] < 0 else known[-4:-1]).T
-    if len(gaps) < 3:
-        return known[-1][0]
-    touch = sum(p * w for p, w in zip(pressures, lagrange_coefficients(gaps, 0.0)))
-    return float(np.clip(touch, known[-2][0], known[-1][0]))
 
 
 def _hold(problem, free, case, options, on_step):

@@ -98,40 +98,50 @@ class TouchWatch:
     def __init__(self, contact=False):
         self.contact, self._walls, self._body = contact, _Crossing(), _Crossing()
 
-    def see(self, load, wall_distance, body_distance, contact_force=0.0):
+    def see(self, load, wall_distance, body_distance=np.inf, contact_force=0.0):
         """The Touch of the state at a Load; the same state may be seen again. Walls that push at each other touch, however close."""
-        walls = self._walls.see(load, min(wall_distance, 0.0) if contact_force > 0 else wall_distance)
-        return Touch(wall_distance, body_distance, walls, self._body.see(load, body_distance), self.contact, contact_force)
+        walls, body = self._walls.see(load, np.nan if contact_force > 0 else wall_distance), self._body.see(load, body_distance)
+        return Touch(wall_distance, body_distance, walls, body, self.contact, contact_force)
 
 
 class _Crossing:
-    """The Load at which a distance passes zero for the first time."""
+    """The Load at which a distance passes zero for the first time; nan: it has, and contact keeps it from showing."""
 
     def __init__(self):
         self._known, self.met = [], None
 
     def see(self, load, distance):
-        if self.met is None and np.isfinite(distance):
+        if self.met is None and not np.isinf(distance):
             if not self._known or (load, distance) != self._known[-1]:
-                self._known = [*self._known[-2:], (load, distance)]
-            if distance <= 0:
+                self._known = [*self._known[-3:], (load, distance)]
+            if not distance > 0:
                 loads, distances = zip(*self._known)
                 self.met = Load(*first_zero([(p.pressure, p.dead_loads) for p in loads], distances).tolist())
         return self.met
 
 
 def first_zero(loads, distances):
-    """(k,) loads at which the distance passes zero between the last two of loads (n, k), distances (n,), of which the last is <= 0.
+    """(k,) loads at which the distance passes zero between the last two of loads (n, k), distances (n,), of which the last is <= 0,
+    or nan where walls in contact push at each other.
 
-    By the parabola through the last three where that stays between the last two, else by their chord.
+    Interpolated by the parabola through the last three where that stays between the last two, else by their chord. In contact
+    extrapolated from the three before, within the last step; where these are no three that close, the last load, which is near: no step
+    is taken across a deep overlap (hifi.path).
     """
-    loads, distances = np.asarray(loads, float)[-3:], np.asarray(distances, float)[-3:]
+    loads, distances = np.asarray(loads, float), np.asarray(distances, float)
     if len(loads) == 1:
         return loads[-1]
-    share = distances[-2] / (distances[-2] - distances[-1])
-    chord = loads[-2] + share * (loads[-1] - loads[-2])
-    if len(loads) == 3 and distances[0] > distances[1]:
-        curve = np.array(lagrange_coefficients(distances, 0.0)) @ loads
-        if (np.minimum(loads[1], loads[2]) <= curve).all() and (curve <= np.maximum(loads[1], loads[2])).all():
+    between = np.sort(loads[-2:], axis=0)
+    pushing = np.isnan(distances[-1])
+    known = slice(-4, -1) if pushing else slice(-3, None)
+    three = distances[known]
+    if len(three) == 3 and three[0] > three[1] > three[2]:
+        curve = np.array(lagrange_coefficients(three, 0.0)) @ loads[known]
+        if pushing:
+            return np.clip(curve, *between)
+        if (between[0] <= curve).all() and (curve <= between[1]).all():
             return curve
-    return chord
+    if pushing:
+        return loads[-1]
+    share = distances[-2] / (distances[-2] - distances[-1])
+    return loads[-2] + share * (loads[-1] - loads[-2])

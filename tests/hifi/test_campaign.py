@@ -87,7 +87,7 @@ def test_first_touch_lies_where_the_wall_distance_would_pass_zero_and_before_wal
     def free(pressure, distance, force=0.0):
         return {"kind": "free", "pressure": pressure, "wall_distance": distance, "contact_force": force}
 
-    open_ones = [free(0.0, 0.5), free(0.1, 0.2)]
+    open_ones = [free(0.0, 0.5), free(0.05, 0.35), free(0.1, 0.2)]
     assert first_touch([*open_ones, free(0.2, 0.001, 0.3)]) == pytest.approx(0.1 + 0.2 / 3)
     assert first_touch([*open_ones, free(0.12, 0.001, 0.3)]) == pytest.approx(0.12)
     assert first_touch([free(0.0, 0.5), free(0.1, 0.001, 0.3)]) == 0.1

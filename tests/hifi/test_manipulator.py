@@ -7,18 +7,9 @@ from mpi4py import MPI
 from base import se3
 from base.errors import ConvergenceError
 from geometry import Manipulator, Segment
-from geometry.designfile import read_design
 from geometry.mesh import mesh_manipulator
 from hifi.manipulator import ManipulatorSolve
 from tests import reference_case
-
-
-@pytest.fixture
-def reference():
-    design = read_design(reference_case.DATA / "reference.toml")
-    solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
-    yield solve
-    solve.destroy()
 
 
 def meshed(manipulator, directory, size=3.0):

@@ -10,12 +10,10 @@ from mpi4py import MPI
 from base import se3
 from base.materials import NeoHookean
 from geometry import Manipulator, Segment
-from geometry.designfile import Design, read_design
+from geometry.designfile import Design
 from hifi.body_distance import winding_numbers
-from hifi.manipulator import ManipulatorSolve
 from hifi.manipulator_run import solve_design
 from hifi.touch import Load, Touch, TouchWatch, first_zero
-from tests import reference_case
 from tests.hifi.test_manipulator import set_positions
 
 #: mm of undeformed length in one turn of the staircase that the reference body, 44 mm long, is wound to
@@ -24,14 +22,6 @@ TALL = Segment(
     "twisting", 60.0, 2, width=15.0, channel_width=4.0, channel_height=2.0, cavity_floor=0.5, chamber_height=7.5, gap=1.0,
     material=NeoHookean(0.317),
 )  # fmt: skip
-
-
-@pytest.fixture
-def reference():
-    design = read_design(reference_case.DATA / "reference.toml")
-    solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
-    yield solve
-    solve.destroy()
 
 
 def wind(solve, clear):
