@@ -4,12 +4,15 @@ Wall nodes are few: every rank knows where they all are, and each computes its s
 normal of their walls, whose own motion is left out of the forces: it moves them by the overlap, microns, over the walls' size.
 """
 
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from hifi import surface
+from hifi.contact_update import TouchingSides
 from hifi.wall_contact import DEEPEST, mean_normal, touching
 
 
@@ -31,7 +34,7 @@ class BodyContact:
         # a gap is computed by one rank
         mine = range(self.comm.rank, len(laws), self.comm.size)
         self._sides = [(2 * g + i, np.flatnonzero(wall == 2 * g + i), np.flatnonzero(wall == 2 * g + 1 - i)) for g in mine for i in (0, 1)]
-        self._then, self._now = [], []
+        self._sides_in_touch = TouchingSides()
         #: see hifi.newton
         self.overreach = 0.0
 
@@ -57,19 +60,19 @@ class BodyContact:
 
     def residual(self):
         """(owned dofs,) how the energy stored in overlaps changes with the dofs."""
-        self._now, zero = self._touching(), sp.csr_matrix((self._size, 1))
-        deep = [(s.touching.overlap.max() + self._laws[s.number // 2].onset) / self._gaps[s.number // 2] for s in self._now]
+        self._sides_in_touch.now, zero = self._touching(), sp.csr_matrix((self._size, 1))
+        deep = [(s.touching.overlap.max() + self._laws[s.number // 2].onset) / self._gaps[s.number // 2] for s in self._sides_in_touch.now]
         self.overreach = self.comm.allreduce(max(deep, default=0.0), op=MPI.MAX) / DEEPEST
         if not self.overreach:
             return np.zeros(self._owned.stop - self._owned.start)
-        return self._sum([zero, *(s.forces() for s in self._now)]).toarray()[:, 0]
+        return self._sum([zero, *(s.forces() for s in self._sides_in_touch.now)]).toarray()[:, 0]
 
     def add_tangent(self, matrix):
         """Add the second derivatives of the energy to a PETSc matrix of the mixed space, whose pattern grows; collective."""
-        self._then = self._touching()
-        if not self.comm.allreduce(len(self._then)):
+        self._sides_in_touch.then = self._touching()
+        if not self.comm.allreduce(len(self._sides_in_touch.then)):
             return
-        rows = self._sum([sp.csr_matrix((self._size, self._size)), *(s.tangent() for s in self._then)])
+        rows = self._sum([sp.csr_matrix((self._size, self._size)), *(s.tangent() for s in self._sides_in_touch.then)])
         owned = self._owned.stop - self._owned.start
         both = ((owned, self._size), (owned, self._size))
         contact = PETSc.Mat().createAIJ(both, csr=(rows.indptr, rows.indices, rows.data), comm=self.comm)
@@ -77,27 +80,18 @@ class BodyContact:
         contact.destroy()
 
     def stiffnesses(self, factorised=False):
-        """{point: N/mm} at the last residual, or the last tangent, of all ranks."""
-        sides = self._then if factorised else self._now
-        own = {point: value for side in sides for point, value in side.touching.stiffnesses(side.number).items()}
-        return {point: value for part in self.comm.allgather(own) for point, value in part.items()}
+        """{point: N/mm} at the last residual, or at the last tangent, of all ranks."""
+        parts = self.comm.allgather(self._sides_in_touch.stiffnesses(factorised))
+        return {point: value for part in parts for point, value in part.items()}
 
     def gradients(self, points):
-        """(m, owned dofs): how the gaps of points that push, or did so at the last tangent, change."""
-        places, parts = {p: i for i, p in enumerate(points)}, {}
-        for side in [*self._now, *self._then]:  # what is taken away was put in as it was then
-            chosen = [(places[p], row) for row, p in enumerate(side.touching.stiffnesses(side.number)) if p in places]
-            if chosen:
-                to, of = np.array(chosen).T
-                parts |= dict(zip(to.tolist(), side.gradient()[of]))
-        empty = sp.csr_matrix((1, self._size))
-        own = sp.vstack([parts.get(i, empty) for i in range(len(points))]).tocsr()
-        return sum(self.comm.allgather(own))[:, self._owned].toarray()
+        """(m, owned dofs): how the gaps of points change."""
+        return sum(self.comm.allgather(self._sides_in_touch.gap_gradients(points, self._size)))[:, self._owned].toarray()
 
     def forces(self):
         """(gaps, 3) N at the last residual, on all ranks: of each gap's first wall on the second."""
         rows = np.zeros((len(self._laws), 3))
-        for side in self._now:
+        for side in self._sides_in_touch.now:
             t = side.touching
             rows[side.number // 2] += (-1) ** side.number * (t.area * t.pressure) @ t.normal
         return self.comm.allreduce(rows)
@@ -115,8 +109,9 @@ class _Side:
         f, dofs = self.touching.forces.reshape(-1, 36)[self._kept], self._dofs[self._kept]
         return sp.coo_matrix((f, (dofs, 0 * dofs)), shape=(self._size, 1)).tocsr()
 
-    def gradient(self):
-        """Sparse (points, dofs): of the gaps."""
+    @cached_property
+    def gap_gradients(self):
+        """Sparse (points, dofs): first derivatives of the gaps."""
         t, dofs = self.touching, self._dofs[self._kept]
         points = np.broadcast_to(t.point[:, None], self._dofs.shape)[self._kept]
         return sp.coo_matrix((t.gradient.reshape(-1, 36)[self._kept], (points, dofs)), shape=(len(t.area), self._size)).tocsr()
@@ -127,5 +122,5 @@ class _Side:
         bend = -t.push[:, None, None] * t.bend
         places = [np.broadcast_to(d, both.shape)[both] for d in (self._dofs[:, :, None], self._dofs[:, None, :])]
         bend = sp.coo_matrix((bend[both], places), shape=(self._size, self._size)).tocsr()
-        gradient = self.gradient()
+        gradient = self.gap_gradients
         return bend + gradient.T @ sp.diags(t.area * t.slope) @ gradient

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from base.left_jacobian import LeftJacobian
 from hifi import surface
+from hifi.contact_update import TouchingSides
 from hifi.wall_contact import DEEPEST, mean_normal, touching
 from hifi.walls import IN_CONTACT, WallContact, distances_from
 
@@ -25,7 +26,7 @@ class CellContact:
     def __init__(self, problem, walls, penalty):
         self.problem, segment = problem, problem.segment
         self.law = penalty.on(segment.material.mu, segment.gap)
-        self._sides, self._then, self._now = [], [], []
+        self._sides, self._sides_in_touch = [], TouchingSides()
         #: deepest overlap at the last residual, over DEEPEST of the gap; 0 where nothing comes closer than the penalty's onset
         self.overreach = 0.0
         for gap in walls.gaps:
@@ -56,47 +57,31 @@ class CellContact:
 
     def residual(self):
         """(unknowns,) and (6,): how the energy changes with the problem's unknowns and strains (e, k)."""
-        forces, slope = np.zeros(self.problem.unknowns), np.zeros(6)
-        self._now, deepest = self._touching(), 0.0
-        for side in self._now:
+        forces = np.zeros(self.problem.unknowns + 6)
+        self._sides_in_touch.now, deepest = self._touching(), 0.0
+        for side in self._sides_in_touch.now:
             deepest = max(deepest, side.touching.overlap.max() + self.law.onset)
-            local, wrench = side.first_derivatives()
-            np.add.at(forces, side.columns[side.kept], local[side.kept])
-            slope += wrench
+            np.add.at(forces, side.columns[side.kept], side.first_derivatives()[side.kept])
         self.overreach = deepest / (DEEPEST * self.problem.segment.gap)
-        return forces, slope
+        return forces[:-6], forces[-6:]
 
     def tangent(self):
         """((rows, columns, values) in the unknowns, (unknowns, 6), (6, 6)): second derivatives of the energy."""
-        n = self.problem.unknowns
-        total, mixed, curvature = sp.csr_matrix((n, n)), np.zeros((n, 6)), np.zeros((6, 6))
-        self._then = self._touching()
-        for side in self._then:
-            bend, coupling, own = side.second_derivatives()
-            gradient, by_strains = side.gap_gradients
-            stiff = sp.diags(side.touching.area * side.touching.slope)
-            total = total + bend + gradient.T @ stiff @ gradient
-            mixed += coupling + gradient.T @ (stiff @ by_strains)
-            curvature += own + by_strains.T @ (stiff @ by_strains)
-        total = total.tocoo()
-        return (total.row, total.col, total.data), mixed, curvature
+        n, self._sides_in_touch.then = self.problem.unknowns, self._touching()
+        total = sp.csr_matrix((n + 6, n + 6))
+        for side in self._sides_in_touch.then:
+            gradient = side.gap_gradients
+            total = total + side.bend() + gradient.T @ sp.diags(side.touching.area * side.touching.slope) @ gradient
+        inner = total[:n, :n].tocoo()
+        return (inner.row, inner.col, inner.data), total[:n, n:].toarray(), total[n:, n:].toarray()
 
     def stiffnesses(self, factorised=False):
-        """{point: N/mm} at the last residual, or the last tangent."""
-        sides = self._then if factorised else self._now
-        return {point: value for side in sides for point, value in side.touching.stiffnesses(side.number).items()}
+        """{point: N/mm} at the last residual, or at the last tangent."""
+        return self._sides_in_touch.stiffnesses(factorised)
 
     def gradients(self, points):
-        """(m, unknowns + 6): how the gaps of points that push, or did so at the last tangent, change with unknowns and strains."""
-        out = np.zeros((len(points), self.problem.unknowns + 6))
-        places = {p: i for i, p in enumerate(points)}
-        for side in [*self._now, *self._then]:  # what is taken away was put in as it was then
-            rows = [(places[p], row) for row, p in enumerate(side.touching.stiffnesses(side.number)) if p in places]
-            if rows:
-                to, of = np.array(rows).T
-                gradient, by_strains = side.gap_gradients
-                out[to] = np.hstack([gradient[of].toarray(), by_strains[of]])
-        return out
+        """(m, unknowns + 6): how the gaps of points change with unknowns and strains."""
+        return self._sides_in_touch.gap_gradients(points, self.problem.unknowns + 6).toarray()
 
     def measure(self, pressure):
         """WallContact of the gap with the largest force, `pressure` (MPa) being that of the air."""
@@ -136,7 +121,10 @@ class _Side:
         nodes = np.concatenate([own.facets[t.facet], other.facets[t.other]], axis=1)
         self.s = np.concatenate([own.s[t.facet], other.s[t.other]], axis=1)
         self.x = np.concatenate([places[0][t.facet], places[1][t.other]], axis=1)
-        self.columns = problem.reduced[problem.displacement_dofs[nodes]].reshape(len(nodes), 36)
+        columns = problem.reduced[problem.displacement_dofs[nodes]].reshape(len(nodes), 36)
+        strains = np.broadcast_to(problem.unknowns + np.array(_ORDER), (len(nodes), 6))
+        #: (n, 42) places of the nodes' unknowns, -1 where held, and of the strains' twist (k, e) behind all unknowns
+        self.columns = np.hstack([columns, strains])
         self.kept = self.columns >= 0
         e, k = np.split(problem.strains.value, 2)
         self._jacobian = LeftJacobian(self.s.reshape(-1, 1) * np.concatenate([k, e]))
@@ -150,40 +138,38 @@ class _Side:
         return np.cross(spin, self.x[..., None], axisa=-2, axisb=-2, axisc=-2) + shift
 
     def first_derivatives(self):
-        """(n, 36) by local positions, (6,) by strains (e, k)."""
-        f = self.touching.forces
-        local = np.einsum("...ji,...j->...i", self.rotation, f)
-        return local.reshape(len(f), 36), np.einsum("cnis,cni->s", self._motion(), f)[_ORDER]
+        """(n, 42) of the energy."""
+        return self._chained(self.touching.forces)
 
-    def second_derivatives(self):
-        """Of the energy at fixed pressures: sparse (unknowns, unknowns), (unknowns, 6), (6, 6)."""
+    def _chained(self, by_position):
+        """(n, 42) derivatives by unknowns and twist from those by positions (n, 12, 3)."""
+        local = np.einsum("...ji,...j->...i", self.rotation, by_position).reshape(len(by_position), 36)
+        return np.hstack([local, np.einsum("cnis,cni->cs", self._motion(), by_position)])
+
+    def bend(self):
+        """Sparse (unknowns + 6, same): second derivatives of the energy at fixed pressures."""
         t, D, pairs = self.touching, self._motion(), len(self.s)
         f, H = t.forces, -t.push[:, None, None] * t.bend
         HD = (H @ D.reshape(pairs, 36, 6)).reshape(pairs, 12, 3, 6)
         H = H.reshape(pairs, 12, 3, 12, 3)
         local = np.einsum("caji,cajbk,cbkl->caibl", self.rotation, H, self.rotation, optimize=True).reshape(pairs, 36, 36)
-        both = self.kept[:, :, None] & self.kept[:, None, :]
-        places = [np.broadcast_to(c, both.shape)[both] for c in (self.columns[:, :, None], self.columns[:, None, :])]
-        bend = sp.coo_matrix((local[both], places), shape=(self.unknowns, self.unknowns)).tocsr()
         # the wall turns under a force that stands still: d(R^T f) = R^T (f x spin)
         turned = np.cross(f[..., None], self._rates[..., :3, :], axisa=-2, axisb=-2, axisc=-2)
-        coupling = np.zeros((self.unknowns, 6))
-        local = np.einsum("caji,cajs->cais", self.rotation, HD + turned).reshape(pairs, 36, 6)
-        np.add.at(coupling, self.columns[self.kept], local[self.kept])
-        own = np.einsum("cais,cait->st", D, HD)
+        coupling = np.einsum("caji,cajs->cais", self.rotation, HD + turned).reshape(pairs, 36, 6)
+        own = np.einsum("cais,cait->cst", D, HD)
         wrench = np.concatenate([np.cross(self.x, f), f], axis=-1)
-        own += np.einsum("ca,cast->st", self.s**2, self._jacobian.slope(wrench.reshape(-1, 6)).reshape(*self.s.shape, 6, 6))
+        own += np.einsum("ca,cast->cst", self.s**2, self._jacobian.slope(wrench.reshape(-1, 6)).reshape(*self.s.shape, 6, 6))
         by_place = np.cross(D, f[..., None], axisa=-2, axisb=-2, axisc=-2)  # d(x x f)
-        own += np.einsum("cais,cait->st", self._rates[..., :3, :], by_place)
-        return bend, coupling[:, _ORDER], own[np.ix_(_ORDER, _ORDER)]
+        own += np.einsum("cais,cait->cst", self._rates[..., :3, :], by_place)
+        whole = np.concatenate([np.concatenate([local, coupling], 2), np.concatenate([np.swapaxes(coupling, 1, 2), own], 2)], 1)
+        both = self.kept[:, :, None] & self.kept[:, None, :]
+        places = [np.broadcast_to(c, both.shape)[both] for c in (self.columns[:, :, None], self.columns[:, None, :])]
+        return sp.coo_matrix((whole[both], places), shape=(self.unknowns + 6,) * 2).tocsr()
 
     @cached_property
     def gap_gradients(self):
-        """First derivatives of the gaps: sparse (points, unknowns), (points, 6)."""
-        t = self.touching
-        local = np.einsum("caji,caj->cai", self.rotation, t.gradient).reshape(len(self.s), 36)
-        points = np.broadcast_to(t.point[:, None], local.shape)[self.kept]
-        gradient = sp.coo_matrix((local[self.kept], (points, self.columns[self.kept])), shape=(len(t.area), self.unknowns)).tocsr()
-        by_strains = np.zeros((len(t.area), 6))
-        np.add.at(by_strains, t.point, np.einsum("cais,cai->cs", self._motion(), t.gradient))
-        return gradient, by_strains[:, _ORDER]
+        """Sparse (points, unknowns + 6): first derivatives of the gaps."""
+        t, kept = self.touching, self.kept
+        points = np.broadcast_to(t.point[:, None], kept.shape)[kept]
+        values = self._chained(t.gradient)[kept]
+        return sp.coo_matrix((values, (points, self.columns[kept])), shape=(len(t.area), self.unknowns + 6)).tocsr()

@@ -65,9 +65,9 @@ class Touching:
     """Points of one wall that push at another. A point lies under one facet, or between several: each is a pair of it.
 
     Per point (n,): overlap (mm), area (mm2, undeformed, with the share of this side), energy (N/mm), pressure (MPa), slope
-    (MPa/mm); position, normal (n, 3): the point and the covector m. name (n, 2): facet of this
-    wall and Gauss point on it. Per pair (c,): point, facet of this wall, other of the other
-    wall; gradient (c, 12, 3) of the gap by the six nodes of both, bend (c, 36, 36) its second derivative.
+    (MPa/mm); position, normal (n, 3): the point (mm) and the covector m; name (n, 2): facet of this wall and Gauss point on it.
+    Per pair (c,): point, facet of this wall, other of the other wall; gradient (c, 12, 3) of the gap by the six nodes of both, bend
+    (c, 36, 36) its second derivative in 1/mm.
     """
 
     overlap: np.ndarray
@@ -106,8 +106,8 @@ def mean_normal(facets):
 
 
 def touching(points, areas, wall, direction, law, share=0.5):
-    """The Touching of the Gauss points of facets `points` (n, 6, 3), undeformed areas (n,), on the `wall` (m, 6, 3) that lies in
-    `direction` (3,); None where nothing comes closer than the law's onset."""
+    """The Touching of the Gauss points of facets `points` (n, 6, 3) in mm, undeformed areas (n,) in mm2, on the `wall` (m, 6, 3) that
+    lies in `direction` (3,); None where nothing comes closer than the law's onset. share: of the contact that this side carries."""
     if not len(points) or not len(wall) or not (np.isfinite(points).all() and np.isfinite(wall).all()):
         return None  # a state that has diverged has a residual that says so
     heights = wall @ direction
