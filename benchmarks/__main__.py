@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, contact, law, paper, paper_page, rod, segments, speed, verification
+from benchmarks import cell, chain, contact, contact_page, law, paper, paper_page, rod, segments, speed, verification
 from benchmarks.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -174,6 +174,9 @@ def snapshot():
     if "law" in meta:
         page = ROOT / "docs" / "rod-law.md"
         write_text(page, law.page(page.read_text(), meta["law"]["details"]))
+    if "contact" in meta:
+        page = ROOT / "docs" / "contact.md"
+        write_text(page, contact_page.page(page.read_text(), results, meta["contact"]["details"]))
     if "paper" in meta:
         write_text(ROOT / "docs" / "paper-models.md", paper_page.page(meta, ROOT / "docs"))
     if "verification" in meta:

@@ -13,6 +13,10 @@ TOP = 0.05
 CHECKED = (0.01, 0.03, 0.05)
 #: of the default medium's stiffness, thickness when squeezed (J0) and regularisation: what the extrapolation starts from
 SOFTNESSES = (1.0, 0.5, 0.25)
+#: keys of the details that the page is made of
+ANGLES = "angle_kPa_tau_force_N_area_mm2_nearest_mm_farthest_mm"
+PARAMETERS = "parameter_factor_tau_50kPa_force_N_distance_rel_gap"
+FINE = "kPa_tau_finer_with_and_without_force_N"
 #: of the pressure of first touch: where the bias before contact is measured
 JUST_BEFORE = 0.985
 
@@ -76,7 +80,7 @@ def angles(reference):
         for angle, states in found.items()
         for s in states[1:]
     ]
-    return figures, {"angle_kPa_tau_force_N_area_mm2_nearest_mm_farthest_mm": rows}
+    return figures, {ANGLES: rows}
 
 
 def bias(reference):
@@ -106,7 +110,7 @@ def parameters(reference):
     change = max(abs(row[2] - twist(reference.states[-1])) for row in rows)
     figures = {"contact_parameter_sensitivity_rel": change / reference.increment}
     details = {
-        "parameter_factor_tau_50kPa_force_N_distance_rel_gap": rows,
+        PARAMETERS: rows,
         "parameter_sensitivity_of_twist_rel": change / twist(reference.states[-1]),
     }
     return figures, details
@@ -117,7 +121,7 @@ def finer_mesh(reference):
     fine, loose = (run(reference.folder, reference.body, c, size=FINER)[0] for c in ("auto", "none"))
     increment = twist(fine[-1]) - twist(loose[-1])
     details = {
-        "kPa_tau_finer_with_and_without_force_N": [[s.pressure * 1e3, twist(s), twist(t), s.contact.force] for s, t in zip(fine, loose)],
+        FINE: [[s.pressure * 1e3, twist(s), twist(t), s.contact.force] for s, t in zip(fine, loose)],
         "mesh_sensitivity_of_twist_rel": abs(twist(fine[-1]) / twist(reference.states[-1]) - 1),
     }
     return {"contact_mesh_sensitivity_rel": abs(increment / reference.increment - 1)}, details

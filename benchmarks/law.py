@@ -5,11 +5,10 @@ what it costs.
 import numpy as np
 
 from benchmarks.rod import best_seconds
-from benchmarks.tables import table
+from benchmarks.tables import below_mark, table
 
 PRESSURE = 0.02  # MPa
 BATCH = 10_000
-MARK = "<!-- made by `python -m benchmarks --only law` and `--snapshot`; do not edit below -->"
 JUDGED = ("law_strain_median_rel", "law_strain_p95_rel", "law_tip100_p95_rel", "law_stiffness_p95_rel", "law_force_p95_rel")
 
 
@@ -80,8 +79,8 @@ def costs(shipped):
 
 
 def page(text, details):
-    """docs/rod-law.md, of which `text` is the present one, with the part below MARK made anew."""
-    lines = [text.partition(MARK)[0].rstrip(), "", MARK, "", "## How well it does"]
+    """docs/rod-law.md, of which `text` is the present one, with the part below its mark made anew."""
+    lines = ["## How well it does"]
     for kind, found in details.items():
         lines += ["", f"### {kind}", "", found["judged on"], ""]
         lines += table(["figure", "value"], [(f"`{name}`", f"{value:.4g}") for name, value in found["figures"].items()])
@@ -89,4 +88,4 @@ def page(text, details):
         lines += ["", *table(["law of the free strains", "median error", "95th percentile", "without an answer"], rows)]
         rows = [(n, f"{median:.2%}", f"{high:.2%}") for n, median, high in found["learning curve"]]
         lines += ["", *table(["designs trained on", "median error", "95th percentile"], rows)]
-    return "\n".join(lines) + "\n"
+    return below_mark(text, "law", lines)
