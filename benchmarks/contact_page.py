@@ -43,7 +43,7 @@ def page(text, results, details):
         [[kPa, *found[::2], medium[kPa]] for kPa, *found in details["kPa_force_N_tau_of_softer_media"]],
     )
     lines += shown(
-        f"The middle pitch of {segment['chambers']} pairs of chambers on {segment['ranks']} ranks, {segment['dofs']} dofs, the same mesh size:",
+        f"The middle pitch of {segment['chambers']} pairs of chambers on {segment['ranks']} ranks ({segment['dofs']} dofs, same mesh):",
         {"kPa": "g", "tau of the segment": ".2f", "tau of the cell": ".2f", "difference": "+.2%"},
         [
             [level["pressure_kPa"], twist, cell, twist / cell - 1]

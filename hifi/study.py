@@ -13,7 +13,7 @@ from hifi.agreement import on_rank_0
 from hifi.case_process import REFUSED
 from hifi.cases import run_cases
 from hifi.studyfile import read_study, value_of
-from hifi.touch import MARKS
+from hifi.touch import MARKS, marked
 
 #: a case's rows, written by hifi.study_cases
 LEVELS = "levels.csv"
@@ -63,11 +63,6 @@ def _finish(study, table, records, directory, ranks, seconds, say):
     say(f"{summary}; table in {directory / 'study.csv'}" + (f", picture {directory / 'study.png'}" if picture else ""))
 
 
-def overlaps(level):
-    """Whether a level (a row of levels.csv) is marked as one in which parts of the body overlap."""
-    return any(level.get(mark) == "1" for mark in MARKS)
-
-
 class StudyTable:
     """study.csv: for each case that is known one row a pressure level, or one without levels. In order of the study."""
 
@@ -91,7 +86,7 @@ class StudyTable:
     def overlapping(self):
         """Number of the study's cases in which something overlaps at some level."""
         known = [self.of(case) for case in self.study.cases]
-        return sum(any(overlaps(level) for level in levels) for _, levels in filter(None, known))
+        return sum(any(marked(level) for level in levels) for _, levels in filter(None, known))
 
     def write(self):
         study = self.study

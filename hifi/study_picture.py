@@ -4,8 +4,8 @@ import numpy as np
 
 from base.files import atomic_path
 from hifi.case_process import DONE
-from hifi.study import overlaps
 from hifi.studyfile import value_of
+from hifi.touch import marked
 
 PANELS = (
     ("k_norm_per_mm", "|k| (1/m)"),
@@ -38,7 +38,7 @@ def draw(study, table, path):
             for case, record, levels in cases:
                 x, y = (np.array([float(level[name]) for level in levels]) for name in ("pressure_kPa", prefix + column))
                 ax.plot(x, PER_M * y, **looks.of(case))
-                overlapping = [overlaps(level) for level in levels]
+                overlapping = [marked(level) for level in levels]
                 ax.plot(x[overlapping], PER_M * y[overlapping], **OVERLAP)
                 some_overlap |= any(overlapping)
                 if record["status"] != DONE:

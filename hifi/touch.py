@@ -92,6 +92,11 @@ class Touch:
         }
 
 
+def marked(row):
+    """Whether a row of a table, {column: text}, is marked as one in which parts of the body overlap."""
+    return any(row.get(mark) == "1" for mark in MARKS)
+
+
 class TouchWatch:
     """Follows both distances over the accepted states of a path, in their order."""
 
