@@ -1,14 +1,52 @@
 """A cell's shape without a length: what strains times a length depend on when the material has only one modulus."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from geometry.parameters import Segment
+from geometry.parameters import ONE_SIDED, TWISTING, Segment
 
 #: Segment's attributes in order: the angle in degrees, then lengths
 SHAPE = (
     *("angle", "width", "chamber_height", "cavity_thickness", "wall", "gap", "top_wall", "side_wall"),
     *("base_thickness", "roof", "channel_width", "channel_height", "cavity_floor"),
 )
+#: kind -> name -> changes of SHAPE by one: the directions in which designs differ when the normal pitch is the unit of length. Walls
+#: and cavities grow at the gap's cost; what a campaign ties together (hifi.campaign_sample) moves together
+_OF_BOTH = {
+    "angle": {"angle": 1.0},
+    "width": {"width": 1.0},
+    "chamber_height": {"chamber_height": 1.0},
+    "cavity_thickness": {"cavity_thickness": 1.0, "gap": -1.0},
+    "wall": {"wall": 1.0, "gap": -2.0},
+    "channel_width": {"channel_width": 1.0},
+}
+DIRECTIONS = {
+    ONE_SIDED: _OF_BOTH
+    | {
+        "channel_height": {"channel_height": 1.0, "cavity_floor": 0.5},
+        "shell": {"top_wall": 1.0, "side_wall": 1.0, "roof": 1.0},
+        "base_thickness": {"base_thickness": 1.0},
+    },
+    TWISTING: _OF_BOTH
+    | {
+        "channel_height": {"channel_height": 1.0},
+        "shell": {"top_wall": 1.0, "side_wall": 1.0, "base_thickness": 1.0},
+        "roof": {"roof": 1.0},
+        "cavity_floor": {"cavity_floor": 1.0},
+    },
+}
+
+
+def direction_matrix(kind):
+    """(directions, 13) changes of the shape numbers along DIRECTIONS."""
+    return np.array([[change.get(name, 0.0) for name in SHAPE] for change in DIRECTIONS[kind].values()])
+
+
+def changed(segment, change, step):
+    """The Segment `step` along one of DIRECTIONS: degrees, or normal pitches."""
+    length = normal_pitch(segment)
+    return replace(segment, **{n: getattr(segment, n) + step * by * (1 if n == "angle" else length) for n, by in change.items()})
 
 
 def normal_pitch(segment):

@@ -31,6 +31,8 @@ DEGREE = 4
 #: rows of the gauge that see e2 and e3: a sideways displacement X1 e turns about z and y
 _SIDEWAYS = np.zeros((6, 6))
 _SIDEWAYS[4, 2], _SIDEWAYS[5, 1] = -1, 1
+#: attributes that depend on where the nodes are
+_PLACED = ("segment", "nodes", "gauge", "gauge_strains", "walls", "contact", "_bordered")
 
 
 class CellProblem:
@@ -44,7 +46,7 @@ class CellProblem:
     """
 
     def __init__(self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None, medium=None, contact=None):
-        self.segment, comm = segment, MPI.COMM_SELF
+        self.segment, comm, self._gauge_of, self._penalty = segment, MPI.COMM_SELF, (gauge, centre), contact
         self.mesh, self.cell_tags, self.facet_tags = mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, comm)
         mesh = self.mesh
         self.medium = medium.on(mesh) if medium else None
@@ -54,16 +56,37 @@ class CellProblem:
         self.pressure_space, to_mixed_p = self.space.sub(1).collapse()
         self.displacement_dofs = np.asarray(to_mixed).reshape(-1, 3)
         self.pressure_dofs = np.asarray(to_mixed_p)
-        self.nodes = self.displacement_space.tabulate_dof_coordinates()
         self.strains = fem.Constant(mesh, PETSc.ScalarType(np.eye(6)[0]))
         self.pressure = fem.Constant(mesh, PETSc.ScalarType(0.0))
         self._direction = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
         self._define_forms()
+        self.nodes = self.displacement_space.tabulate_dof_coordinates()
         self._reduce(rollers or {})
-        self._define_gauge(gauge, centre)
-        self.walls = CellWalls(self)
-        self.contact = CellContact(self, self.walls, contact) if contact else None
+        self._place()
         self.stretch = PrincipalStretch(self, self.cell_tags.indices[np.isin(self.cell_tags.values, (cad.BODY, cad.LAYER))])
+
+    def _place(self):
+        """What depends on where the nodes are."""
+        self.nodes = self.displacement_space.tabulate_dof_coordinates()
+        self._define_gauge(*self._gauge_of)
+        self.walls = CellWalls(self)
+        self.contact = CellContact(self, self.walls, self._penalty) if self._penalty else None
+        self._bordered = None
+
+    def move(self, segment, vertices):
+        """Make this the cell of another segment, on the same mesh with its vertices (n, 3) elsewhere."""
+        self.segment, self.mesh.geometry.x[:] = segment, vertices
+        self._place()
+
+    @property
+    def placement(self):
+        """All that `move` changes; assigned, it brings the cell back."""
+        return self.mesh.geometry.x.copy(), {name: getattr(self, name) for name in _PLACED}
+
+    @placement.setter
+    def placement(self, kept):
+        self.mesh.geometry.x[:], placed = kept
+        vars(self).update(placed)
 
     def _define_forms(self):
         mesh, material = self.mesh, self.segment.material
@@ -106,7 +129,6 @@ class CellProblem:
         self._volume = compat.compile_form(J * air)
         self._matrix = fem.petsc.create_matrix(self._tangent)
         self._vector = fem.petsc.create_vector(self._residual)
-        self._bordered = None
 
     def _reduce(self, rollers):
         """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p has -1."""

@@ -145,6 +145,8 @@ class CellSystem:
         return gradient
 
     def factorise(self):
+        """Factorise the tangent. influence (unknowns + 6, 6): how unknowns and multipliers resist strains, K^-1 d2Pi/du d(e,k);
+        condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so on."""
         matrix, mixed, self._curvature = self.problem.tangent()
         if self._pattern is not matrix.indices:
             self._release()
@@ -158,8 +160,8 @@ class CellSystem:
         self._solver.factorise()
         self._factorisations += 1
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
-        self._influence = self._solver.solve_many(self._mixed)
-        self._condensed = self._curvature - self._mixed.T @ self._influence
+        self.influence = self._solver.solve_many(self._mixed)
+        self.condensed = self._curvature - self._mixed.T @ self.influence
         self._update = ContactUpdate(self.problem.contact.stiffnesses(factorised=True) if self.problem.contact else {})
 
     def renew(self):
@@ -174,20 +176,24 @@ class CellSystem:
         """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was renewed."""
         return self._update.corrected(self._solve(right[:, None])[:, 0])
 
+    def solve_inner(self, right):
+        """Inverse of the factorised tangent at held strains times right (unknowns + 6, columns)."""
+        return self._solver.solve_many(right)
+
     def _solve(self, right):
         """K^-1 right (., columns) with the factorised tangent: bordering."""
         free, n = self._free, self.problem.unknowns + 6
-        z = self._solver.solve_many(right[:n])
+        z = self.solve_inner(right[:n])
         if not len(free):
             return z
-        C = self._condensed[np.ix_(free, free)]
+        C = self.condensed[np.ix_(free, free)]
         q = np.linalg.solve(C, right[n:] * self.pitch - self._mixed[:, free].T @ z)
-        return np.vstack([z - self._influence[:, free] @ q, q * self.pitch])
+        return np.vstack([z - self.influence[:, free] @ q, q * self.pitch])
 
     @property
     def unstable(self):
         """Unstable directions of the factorised state: each multiplier takes one negative pivot, strains count apart."""
-        free = self._condensed[np.ix_(self._free, self._free)]
+        free = self.condensed[np.ix_(self._free, self._free)]
         inner = self._solver.negative_pivots - self.problem.constraints - 6
         return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))
 
@@ -227,7 +233,7 @@ class CellSystem:
             RodStrains(q[:3].copy(), q[3:].copy()),
             slope[:3] / self.pitch,
             slope[3:] / self.pitch,
-            self._condensed / self.pitch,
+            self.condensed / self.pitch,
             self.problem.air_volume(),
             self.unstable,
             self.problem.stretch.largest(),
