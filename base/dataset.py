@@ -5,6 +5,7 @@ without dimension. With l the normal pitch (thickness of a chamber and a gap, ac
 neo-Hookean material, and everything per undeformed length of the segment:
     pressure P/mu, strains q = (e, k l), forces dpsi/dq = (force/(mu l^2), moment/(mu l^3)), stiffness d2psi/dq2,
     volume V/l^2, energy W/(mu l^2)
+Derivatives by the shape are along about['directions'], by kind: changes of the shape numbers (degrees, normal pitches).
 One row a *case* (a design on a mesh) and one row a *state* (an equilibrium of a case).
 """
 
@@ -15,9 +16,11 @@ import numpy as np
 from base.archive import read_archive, write_archive
 from base.errors import InputError
 
-SCHEMA = "pneunet-cells-1"
+SCHEMA = "pneunet-cells-2"
 #: row-wise upper triangle of a symmetric 6 x 6 matrix
 UPPER = np.triu_indices(6)
+#: directions that a kind may have at most; rows beyond its own are nan
+DIRECTIONS = 10
 #: kind -> strains (of e1 e2 e3 k1 k2 k3) that must vanish when free: a one-sided cell maps to itself under a half turn about z, a
 #: twisting one under those about x, y and z
 FORBIDDEN = {"one-sided": [2, 5], "twisting": [1, 2, 4, 5]}
@@ -30,7 +33,8 @@ def column(of, shape, kind, note):
 
 @dataclass(frozen=True)
 class CellData:
-    """The arrays, first axis cases (n) or states (m). `about` is a dict: kinds, meshes, shape (names), reasons, campaign, ..."""
+    """The arrays, first axis cases (n) or states (m). `about` is a dict: kinds, meshes, shape (names), directions,
+    reasons, campaign, ..."""
 
     about: dict
     # ---- cases
@@ -61,6 +65,8 @@ class CellData:
     residual: np.ndarray = column("states", (), "f4", "norm over mu pitch^2")
     wall_distance: np.ndarray = column("states", (), "f4", "smallest of neighbouring chambers over l; nan: not measured")
     contact: np.ndarray = column("states", (), "?", "computed with contact")
+    strain_slopes: np.ndarray = column("states", (DIRECTIONS, 6), "f4", "of free strains along the directions; nan: not computed")
+    stiffness_slopes: np.ndarray = column("states", (DIRECTIONS, 21), "f4", "of the stiffness of free states, likewise")
 
     def __post_init__(self):
         rows = {"cases": len(self.kind), "states": len(self.case)}
@@ -74,10 +80,7 @@ class CellData:
     @property
     def matrices(self):
         """(m, 6, 6) stiffness."""
-        full = np.zeros((len(self.case), 6, 6))
-        full[:, UPPER[0], UPPER[1]] = self.stiffness
-        full[:, UPPER[1], UPPER[0]] = self.stiffness
-        return full
+        return full_matrices(self.stiffness)
 
     @property
     def overlapping(self):
@@ -122,6 +125,13 @@ class CellData:
             work = CubicSpline(V, P).integrate(V[0], V[-1]) if (np.diff(V) > 0).all() else np.nan
             out[row] = abs(W[-1] - W[0] - work) / work
         return out
+
+
+def full_matrices(upper):
+    """(..., 6, 6) symmetric matrices of their upper triangles (..., 21)."""
+    full = np.zeros((*upper.shape[:-1], 6, 6))
+    full[..., UPPER[0], UPPER[1]] = full[..., UPPER[1], UPPER[0]] = upper
+    return full
 
 
 def columns():

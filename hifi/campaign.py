@@ -8,48 +8,52 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from base.dataset import UPPER, CellData, columns, write_dataset
+from base.dataset import DIRECTIONS, UPPER, CellData, columns, write_dataset
 from base.datasheet import datasheet
 from base.errors import InputError
 from base.files import output_directory, write_text
 from base.record import revision, write_record
-from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
+from geometry.shape_numbers import SHAPE, direction_matrix, normal_pitch, shape_numbers
 from hifi.agreement import on_rank_0
 from hifi.campaign_case import STATES
+from hifi.campaign_extension import Known, taken_over
 from hifi.campaign_sample import MU
 from hifi.campaignfile import read_campaign
-from hifi.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
-from hifi.cases import CRASHED, OUT_OF_TIME, run_cases
+from hifi.cases import STATUSES, run_cases
 
 DATA, SHEET = "cells.npz", "cells.md"
-STATUSES = [DONE, STOPPED, REFUSED, ERROR, CRASHED, OUT_OF_TIME, MEMORY]
 #: s between two writings of the data set while it grows
 PAUSE = 60.0
 #: strains that the body's half turns forbid over all, above which a case is not accepted: its mesh is too coarse
 LARGEST_SYMMETRY_DEFECT = 0.02
 
 
-def run_campaign(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False):
-    """Compute the cases of CAMPAIGN.toml that are not finished in `directory`; collective. Returns the CellData on rank 0.
+def run_campaign(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False, extend=None):
+    """Compute the cases of CAMPAIGN.toml that are not finished in `directory`; collective. Returns the CellData.
 
-    directory gets cells.npz and its data sheet cells.md, rewritten while it grows, run.json and cases/NAME.
+    extend: a data set whose cases are taken over as they are. directory gets cells.npz and its data sheet cells.md, rewritten while
+    it grows, run.json and cases/NAME.
     """
     say, directory, started = say if comm.rank == 0 else (lambda text: None), Path(directory), time.perf_counter()
     campaign = on_rank_0(comm, lambda: read_campaign(path))
+    known = on_rank_0(comm, lambda: taken_over(campaign, extend)) if extend else Known()
     on_rank_0(comm, lambda: output_directory(directory) and None)
     counts = Counter((d.kind, d.mesh.name) for d in campaign.designs)
     for (kind, mesh), number in counts.items():
         say(f"campaign: {number} {kind} designs on mesh '{mesh}'")
-    gathering = Gathering(campaign, directory)
-    run_cases([d.case for d in campaign.designs], directory / "cases", campaign.limits, comm, say, gathering.add, retry)
-    return on_rank_0(comm, lambda: gathering.finish(comm.size, time.perf_counter() - started, say)) if comm.rank == 0 else None
+    gathering = Gathering(campaign, directory, known)
+    if extend:
+        say(f"{len(known.cases)} of them are taken over from {extend}")
+    cases = [d.case for d in campaign.designs if d.case.name not in known.cases]
+    run_cases(cases, directory / "cases", campaign.limits, comm, say, gathering.add, retry)
+    return on_rank_0(comm, lambda: gathering.finish(comm.size, time.perf_counter() - started, say))
 
 
 class Gathering:
-    """The records that are known, turned into the data set."""
+    """The records that are known, and what is taken over (`known`), turned into the data set."""
 
-    def __init__(self, campaign, directory):
-        self.campaign, self.directory = campaign, Path(directory)
+    def __init__(self, campaign, directory, known):
+        self.campaign, self.directory, self.known = campaign, Path(directory), known
         self.records, self.written = {}, time.monotonic()
         self._states = {}
 
@@ -82,15 +86,19 @@ class Gathering:
     def data(self):
         """The CellData of what is known so far, in order of the sample."""
         c = self.campaign
-        known = [d for d in c.designs if d.case.name in self.records]
+        known = [d for d in c.designs if d.case.name in self.records or d.case.name in self.known.cases]
         rows = {f.name: [] for f in columns()}
         reasons = {}
         for i, design in enumerate(known):
-            record = self.records[design.case.name]
-            if record["reason"]:
-                reasons[str(i)] = record["reason"]
-            case = _case_row(c, design, record)
-            states = [_state_row(i, design.segment, s) for s in self._states[design.case.name]]
+            if design.case.name in self.known.cases:
+                case, states, reason = self.known.cases[design.case.name]
+            else:
+                record = self.records[design.case.name]
+                case, reason = _case_row(c, design, record), record["reason"]
+                states = [_state_row(design.segment, s) for s in self._states[design.case.name]]
+            if reason:
+                reasons[str(i)] = reason
+            states = [{**state, "case": i} for state in states]
             for name, value in case.items():
                 rows[name].append(value)
             for state in states:
@@ -100,12 +108,13 @@ class Gathering:
             "kinds": list(c.kinds),
             "meshes": [{"name": m.name, **m.settings} for m in c.meshes],
             "shape": list(SHAPE),
-            "statuses": STATUSES,
+            "directions": {kind: direction_matrix(kind).tolist() for kind in c.kinds},
+            "statuses": list(STATUSES),
             "reasons": reasons,
             "campaign": c.table,
             "ranges": c.ranges,
             "largest_symmetry_defect": LARGEST_SYMMETRY_DEFECT,
-            "revisions": sorted({r["revision"] for r in self.records.values() if "revision" in r} or {revision()}),
+            "revisions": sorted({r["revision"] for r in self.records.values() if "revision" in r} | self.known.revisions or {revision()}),
         }
         arrays = {f.name: np.asarray(rows[f.name], f.metadata["type"]).reshape(-1, *f.metadata["shape"]) for f in columns()}
         return CellData(about, **arrays)
@@ -131,14 +140,13 @@ def _case_row(campaign, design, record):
     }
 
 
-def _state_row(row, segment, state):
+def _state_row(segment, state):
     """A state of states.json (mm, MPa) without dimension: see base.dataset."""
     length = normal_pitch(segment)
     scale = np.array([1, 1, 1, length, length, length])
     force = MU * length**2
     wall = state["wall_distance"]
     return {
-        "case": row,
         "prescribed": state["kind"] != "free",
         "pressure": state["pressure"] / MU,
         "strains": np.array(state["strains"]) * scale,
@@ -151,4 +159,13 @@ def _state_row(row, segment, state):
         "residual": state["residual"],
         "wall_distance": np.nan if wall is None else wall / length,
         "contact": state["contact"],
+        "strain_slopes": _slopes(state.get("strain_slopes"), lambda a: a * scale, 6),
+        "stiffness_slopes": _slopes(state.get("stiffness_slopes"), lambda a: (a / np.outer(scale, scale) / force)[:, *UPPER], 21),
     }
+
+
+def _slopes(values, without_dimension, width):
+    out = np.full((DIRECTIONS, width), np.nan)
+    if values is not None:
+        out[: len(values)] = without_dimension(np.array(values))
+    return out

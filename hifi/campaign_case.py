@@ -22,6 +22,7 @@ from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
 from hifi.control import LoadControl, VolumeControl
 from hifi.newton import NewtonOptions
 from hifi.path import EquilibriumPath, PathState
+from hifi.shape_slopes import ShapeSlopes
 from hifi.solver import NotConverged
 from hifi.stepping import StepSize, run_steps
 from hifi.touch import Load, TouchWatch
@@ -34,6 +35,8 @@ SCOUT_TOLERANCE = 1e-5
 FIRST, LARGEST, FURTHEST = 0.03, 0.5, 30.0
 #: a prescribed state is walked to in steps of at most this part of the way
 HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.1
+#: free states whose stiffness is differentiated by the shape, where the strains are: every n-th
+STIFFNESS_SLOPES_EVERY = 4
 REST = np.eye(6)[0]
 
 
@@ -42,7 +45,8 @@ class _Enough(Exception):
 
 
 def solve_campaign_case(inputs, directory):
-    """Case of hifi.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share", "prescribed"}.
+    """Case of hifi.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share", "prescribed",
+    "slopes": whether free states are differentiated by the shape}.
 
     directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where there was none),
     top pressure, first touch of walls, why prescribed states are missing, CPU time. ConvergenceError when the free path ends
@@ -51,7 +55,7 @@ def solve_campaign_case(inputs, directory):
     segment = segment_from_table(inputs["segment"], "segment", material_from_table(inputs["material"], "material"))
     path = directory / "cell.msh"
     mesh = mesh_cell(segment, path=path, **{key.removesuffix("_mm"): value for key, value in inputs["mesh"].items()})
-    sampler = Sampler(CellProblem(segment, path, contact=WallPenalty()), directory)
+    sampler = Sampler(CellProblem(segment, path, contact=WallPenalty()), directory, inputs["slopes"])
     path.unlink()
     mesh["unknowns"] = sampler.problem.unknowns
     top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
@@ -71,11 +75,12 @@ def solve_campaign_case(inputs, directory):
 class Sampler:
     """The states of one cell."""
 
-    def __init__(self, problem, directory):
+    def __init__(self, problem, directory, slopes=False):
         self.problem, self.directory = problem, directory
         self.mu = problem.segment.material.mu
         self.system = CellSystem(problem)
         self.energy = StoredEnergy(problem)
+        self.slopes = ShapeSlopes(problem) if slopes else None
         self.options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
         self.walked = []  # PathStates of the scout, their parameter the pressure
         self.kept = []  # (CellState, state array) of the free states
@@ -143,7 +148,9 @@ class Sampler:
     def _record(self, array, residual, kind, system=None):
         system = system or self.system
         state = system.measure()
+        slopes = {}
         if kind == "free":
+            slopes = self._slopes(system, len(self.kept))
             self.kept.append((state, array.copy()))
         scale = self.mu * self.problem.segment.pitch**2
         row = {
@@ -160,9 +167,17 @@ class Sampler:
             "wall_distance": state.wall_distance,
             "contact": state.contact is not None,
             "contact_force": state.contact.force,
+            **slopes,
         }
         self.states.append(row)
         write_text(self.directory / STATES, json.dumps(self.states, default=float))
+
+    def _slopes(self, system, number):
+        """What a row says of the free state's derivatives by the shape: hifi.shape_slopes."""
+        if not self.slopes:
+            return {}
+        strains, stiffness = self.slopes.of(system, stiffness=number % STIFFNESS_SLOPES_EVERY == 0)
+        return {"strain_slopes": strains.tolist()} | ({} if stiffness is None else {"stiffness_slopes": stiffness.tolist()})
 
     def prescribed(self, wanted):
         """Record the states of `wanted` ([{"level", "amplitude", "direction"}]); returns why some are missing (n,) texts."""

@@ -22,7 +22,8 @@ class Mesh:
     """What geometry.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th designs, from the first, are
     computed on it.
 
-    prescribed: states at prescribed strains of every prescribed_every-th of those.
+    prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free states of designs that
+    are not held out are differentiated by the shape.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Mesh:
     every: int = 1
     prescribed: int = 0
     prescribed_every: int = 1
+    slopes: bool = False
 
     def prescribed_of(self, index):
         """How many prescribed states the design has."""
@@ -96,8 +98,10 @@ def read_campaign(path):
         for index, segment in enumerate(bodies):
             for mesh in meshes:
                 if index % mesh.every == 0:
-                    case = _case(kind, index, mesh, segment, held[index][: mesh.prescribed_of(index)], common)
-                    designs.append(Design(kind, index, mesh, is_held_out(index, held_out_every), segment, case))
+                    judge = is_held_out(index, held_out_every)
+                    prescribed = held[index][: mesh.prescribed_of(index)]
+                    case = _case(kind, index, mesh, segment, prescribed, common | {"slopes": mesh.slopes and not judge})
+                    designs.append(Design(kind, index, mesh, judge, segment, case))
     designs.sort(key=lambda d: d.index)
     table = {"designs": count, "seed": seed, "held_out_every": held_out_every, **common}
     return Campaign(
@@ -128,7 +132,7 @@ def _meshes(rows, where):
     meshes = []
     for i, row in enumerate(rows, start=1):
         at = f"{where} [[mesh]] {i}"
-        refuse_unknown(row, ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every"], at)
+        refuse_unknown(row, ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every", "slopes"], at)
         for key in ("name", "mesh_size_mm"):
             if key not in row:
                 raise InputError(f"{at}: key '{key}' is missing")
@@ -143,7 +147,10 @@ def _meshes(rows, where):
             counts.append(number(row.get(key, default), key, at, integer=True))
             if not low <= counts[-1] <= high:
                 raise InputError(f"{at}: {key} = {counts[-1]} must lie in {low}..{high}")
-        meshes.append(Mesh(str(row["name"]), settings, *counts))
+        slopes = row.get("slopes", False)
+        if not isinstance(slopes, bool):
+            raise InputError(f"{at}: slopes = {slopes!r} must be true or false")
+        meshes.append(Mesh(str(row["name"]), settings, *counts, slopes))
     if len({m.name for m in meshes}) < len(meshes):
         raise InputError(f"{where}: two [[mesh]] have the same name")
     return tuple(meshes)

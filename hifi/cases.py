@@ -28,12 +28,13 @@ from base.files import output_directory, write_text
 from base.processes import Limits, environment_without_launcher, machine_memory_MB, run_limited
 from base.record import revision
 from hifi.agreement import on_rank_0
-from hifi.case_process import DONE, MEMORY, REFUSED, STOPPED
+from hifi.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
 from hifi.jit_cache import own_cache
 
 OUT_OF_TIME, CRASHED = "out of time", "crashed"
 #: ways to end that are the case's own answer: doing it again would give the same
 ANSWERS = (DONE, STOPPED, REFUSED)
+STATUSES = (*ANSWERS, ERROR, CRASHED, OUT_OF_TIME, MEMORY)
 RECORD = "record.json"
 #: of the machine's memory, shared by the workers on it when no limit is given
 MEMORY_SHARE = 0.9

@@ -126,6 +126,7 @@ def parser():
 
     c = add("campaign", run_campaign, "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml")
     c.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml")
+    c.add_argument("--extend", type=Path, metavar="DATA.npz", help="a data set whose cases are taken over, not computed again")
     c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the campaign; finished cases there are kept")
 
@@ -214,7 +215,7 @@ def run_study(a):
 def run_campaign(a):
     from hifi.campaign import run_campaign as work
 
-    work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry)
+    work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry, extend=a.extend)
 
 
 def run_train(a):

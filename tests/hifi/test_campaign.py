@@ -101,6 +101,7 @@ def test_first_touch_lies_where_the_wall_distance_would_pass_zero_and_before_wal
         ("designs = 0", "designs = 0 must lie in"),
         ('kinds = ["both"]', "'one-sided', 'twisting'"),
         ('[[mesh]]\nname = "a"', "mesh_size_mm' is missing"),
+        ('[[mesh]]\nname = "a"\nmesh_size_mm = 2\nslopes = 1', "slopes = 1 must be true or false"),
         ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
         ("[ranges.one-sided]\nangle_deg = [10, 20]", "outside 30..150"),
     ],
