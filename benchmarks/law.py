@@ -2,6 +2,8 @@
 what it costs.
 """
 
+from concurrent.futures import ProcessPoolExecutor
+
 import numpy as np
 
 from benchmarks.rod import best_seconds
@@ -23,14 +25,12 @@ def law():
     if shipped.about["data_sha256"] != digest(DATA_SET):
         raise InputError(f"{SHIPPED.name} was trained on another data set than {DATA_SET.name}: make it again with pneunet train")
     samples = samples_of(data)
-    judged = judge(shipped.kinds, samples)
+    with ProcessPoolExecutor(max_workers=2) as pool:  # the figures do not depend on how many there are
+        tables = [pool.submit(job, *pair) for pair in samples.values() for job in (compare_laws, learning_curve)]
+        judged = judge(shipped.kinds, samples, pool.map)
+        tables = iter([table.result() for table in tables])
     details = {
-        kind: {
-            "judged on": judged_on(*pair),
-            "figures": judged[kind],
-            "laws": compare_laws(*pair),
-            "learning curve": learning_curve(*pair),
-        }
+        kind: {"judged on": judged_on(*pair), "figures": judged[kind], "laws": next(tables), "learning curve": next(tables)}
         for kind, pair in samples.items()
     }
     # the worse kind's; an interval is as bad as it is off

@@ -1,60 +1,104 @@
 """Gaussian processes: smooth functions of several inputs from few points, with their uncertainty.
 
-Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x')/scales|^2 / 2) + TREND (1 + x.x'), a smooth function
-and a plane whose coefficients are hardly restricted; noise on the observations, and noise that those of a group (the states of one
-mesh) have in common. Scales and noises are shared by the outputs and maximise the likelihood, with each output's variance profiled
-out (Rasmussen & Williams 2006, ch. 2 and 5). Many observations are summed up on `inducing` points of their own (deterministic
-training conditional, ch. 8.3), exactly when all of them are taken.
+Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x') M|^2 / 2) + TREND (1 + x.x'), a smooth function and
+a plane whose coefficients are hardly restricted, the metric M a scale for each input and directions that mix them; noise on
+the observations, and noise that those of a group (the states of one mesh) have in common. Slopes are observed too: directional
+derivatives, with a noise of their own. Metric and noises are shared by the outputs and maximise the likelihood, with each output's
+variance profiled out (Rasmussen & Williams 2006, ch. 2, 5 and 9.4). Many observations are summed up on `inducing` points
+(deterministic training conditional, ch. 8.3), exactly when all observations are among them and there are no slopes.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky, qr, solve_triangular
+from scipy.linalg import cholesky, lapack, qr, solve_triangular
 from scipy.optimize import minimize
 
 #: prior variance of the plane's coefficients over that of the smooth function
 TREND = 100.0
-LOG_NOISE = (np.log(1e-6), np.log(1e-1))
+#: noises of observations, groups and slopes over the prior variance. What a mesh adds, measured by remeshing, is about a percent of
+#: how designs differ: without that bound the likelihood may take for noise what designs do near their limit loads
+LOG_NOISES = tuple((np.log(1e-6), np.log(most)) for most in (1e-4, 1e-5, 1.0))
 LOG_SCALE = (np.log(0.3), np.log(100.0))
 JITTER = 1e-9
 #: evaluated at once: what fits into a core's cache
 ROWS = 256
+#: where the likelihood starts from: scales; noise of observations, of groups, of slopes. It has several maxima: the best one counts
+STARTS = ((3.0, 1e-5, 1e-5, 1e-3), (6.0, 1e-4, 1e-6, 1e-2))
+#: inducing points lie at observations and this far from them, in standard deviations of the inputs, along the ways of their slopes
+AWAY = 0.5
+#: further directions of the metric beside the inputs themselves, where slopes tell them. (Measured: a fifth off the error with slopes;
+#: from values alone they fit the chance of the sample, and the error of designs not seen grows by a half.)
+EXTRA = 2
+#: steps towards the largest likelihood, from a start and from what another process has found
+MOST_STEPS, MORE_STEPS = 100, 30
+#: the likelihood takes a slope for a difference over this, in standard deviations of the inputs
+NEAR = 1e-2
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives of p outputs along `ways` (r, d), changes of the inputs, at the observations `at` (r,): values (r, p)."""
+
+    at: np.ndarray
+    ways: np.ndarray
+    values: np.ndarray
+
+    def of(self, chosen):
+        return Slopes(self.at[chosen], self.ways[chosen], self.values[chosen])
+
+    def columns(self, chosen):
+        return Slopes(self.at, self.ways, self.values[:, chosen])
+
+    def in_units(self, width):
+        """With inputs in units of width (d,) and every way of length 1."""
+        ways = self.ways / width
+        size = np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
+        return Slopes(self.at, ways / size, self.values / size)
+
+
+def no_slopes(inputs, outputs):
+    return Slopes(np.zeros(0, int), np.zeros((0, inputs)), np.zeros((0, outputs)))
 
 
 @dataclass(frozen=True)
 class GaussianProcess:
     """Means of p outputs at inputs of d numbers, which are shifted by `shift` and divided by `width` first.
 
-    observed (n, d): inputs of the observations in those units, the `inducing` (m) first; group (n,), trust (n,): of `fit`, of the
-    first output. scales (d,): of the kernel, in those units too; weights (m + 1 + d, p): of the kernels at the inducing points, the
-    constant and the slopes; variance (p,): each output's prior variance.
+    inducing (m, d), observed (n, d): inducing points and inputs of the observations in those units; group (n,), trust (n,): of `fit`,
+    of the first output; at (r,), ways (r, d): of the Slopes, in those units and of length 1. metric (d, e): the kernel's distances are
+    those of inputs times it; weights (m + 1 + d, p): of the kernels at the inducing points, the constant and the slopes; variance (p,):
+    each output's prior variance; noises: over that.
     """
 
     shift: np.ndarray
     width: np.ndarray
+    inducing: np.ndarray
     observed: np.ndarray
     group: np.ndarray
-    inducing: int
     trust: np.ndarray
-    scales: np.ndarray
+    at: np.ndarray
+    ways: np.ndarray
+    metric: np.ndarray
     weights: np.ndarray
     variance: np.ndarray
     noise: float
     common_noise: float
+    slope_noise: float
 
     @cached_property
     def points(self):
-        """(m, d) inducing points in units of the scales."""
-        return self.observed[: self.inducing] / self.scales
+        """(m, e) inducing points, where distances are the kernel's."""
+        return self.inducing @ self.metric
 
     @cached_property
     def _root(self):
         """(m + 1 + d, same) triangular factor for the deviation, as if every output were as noisy as the first: found when asked for,
         since it is ten times the size of all the rest."""
-        system = _System(self.observed, self.group, self.inducing, self.scales, self.noise, self.common_noise)
-        return qr(system.rows(self.trust[:, None]), mode="r")[0][: len(self.weights)]
+        noises = self.noise, self.common_noise, self.slope_noise
+        system = _System(self.observed, self.group, self.at, self.ways, self.inducing, self.metric, noises)
+        return qr(system.rows(self.trust), mode="r")[0][: len(self.weights)]
 
     @cached_property
     def _kernel_root(self):
@@ -66,7 +110,7 @@ class GaussianProcess:
             parts = [self(x[i : i + ROWS], derivative) for i in range(0, len(x), ROWS)]
             return tuple(map(np.concatenate, zip(*parts))) if derivative else np.concatenate(parts)
         z = (x - self.shift) / self.width
-        a, m = z / self.scales, len(self.points)
+        a, m = z @ self.metric, len(self.points)
         smooth, constant, slopes = self.weights[:m], self.weights[m], self.weights[m + 1 :]
         kernel = _kernel(a, self.points)
         curved = kernel @ smooth
@@ -77,12 +121,12 @@ class GaussianProcess:
         p = smooth.shape[1]
         first = kernel @ (smooth[:, :, None] * self.points[:, None, :]).reshape(m, -1)
         slope = first.reshape(len(x), p, -1) - curved[:, :, None] * a[:, None, :]
-        return mean, (slope / self.scales + slopes.T) / self.width
+        return mean, (slope @ self.metric.T + slopes.T) / self.width
 
     def deviation(self, x):
         """(n, p) standard deviation of the outputs, without noise."""
         z = (x - self.shift) / self.width
-        kernel = _kernel(z / self.scales, self.points)
+        kernel = _kernel(z @ self.metric, self.points)
         basis = np.hstack([kernel, np.ones((len(x), 1)), z])
         missed = 1 - (solve_triangular(self._kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
         known = self.noise * (solve_triangular(self._root, basis.T, trans="T") ** 2).sum(axis=0)
@@ -91,7 +135,7 @@ class GaussianProcess:
 
 @dataclass(frozen=True)
 class SideBySide:
-    """Gaussian processes of consecutive outputs, each with scales and noise of its own, as one."""
+    """Gaussian processes of consecutive outputs, each with metric and noise of its own, as one."""
 
     processes: tuple
 
@@ -105,11 +149,14 @@ class SideBySide:
         return np.concatenate([process.deviation(x) for process in self.processes], axis=1)
 
 
-def fit_side_by_side(x, y, group, trust, widths, like=None):
+def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, again=False):
     """SideBySide processes of `widths` outputs each; the rest as for `fit`."""
     ends = np.cumsum([0, *widths])
     likes = like.processes if like else [None] * len(widths)
-    return SideBySide(tuple(fit(x, y[:, a:b], group, trust[:, a:b], like=known) for a, b, known in zip(ends, ends[1:], likes)))
+    slopes = slopes or no_slopes(x.shape[1], y.shape[1])
+    parts = [slice(*both) for both in zip(ends, ends[1:])]
+    found = [fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, again=again) for c, known in zip(parts, likes)]
+    return SideBySide(tuple(found))
 
 
 def _kernel(a, b):
@@ -119,34 +166,60 @@ def _kernel(a, b):
     return np.exp(np.minimum(k, 0, out=k), out=k)
 
 
-def fit(x, y, group, trust=None, most=500, inducing=1000, seed=0, like=None):
-    """The GaussianProcess through y (n, p) at x (n, d); `like`: another one whose scales and noise are taken as they are.
+def fit(x, y, group, trust=None, slopes=None, most=400, inducing=1500, seed=0, like=None, again=False):
+    """The GaussianProcess through y (n, p) at x (n, d) and Slopes there.
 
+    like: another one whose metric and noise are taken, or with `again` looked for once more, from there.
     group (n,): equal where noise is common. trust (n, p), the same within a group: what noises are divided by, for outputs that
     are quotients by something small.
-    Scales are found on at most `most` of the observations.
+    Metric and noise are found on at most `most` of the observations and as many slopes.
     """
-    trust = np.ones(y.shape) if trust is None else trust
-    shift, width = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
-    z, order = (x - shift) / width, np.random.default_rng(seed).permutation(len(x))
-    if like is not None:
-        shift, width = like.shift, like.width
-        found = like.scales, like.noise, like.common_noise
-        return _condition((x - shift) / width, y, group, trust, order, inducing, shift, width, *found)
-    some = order[:most]
-    data = [(y[np.ix_(some, g)], trust[some, g[0]]) for g in _alike(trust)]
-    centred = [(v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum(), 1 / t) for v, t in data]
+    trust, slopes = np.ones(y.shape) if trust is None else trust, slopes or no_slopes(x.shape[1], y.shape[1])
+    random = np.random.default_rng(seed)
+    shift, width = (like.shift, like.width) if like else (x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12))
+    z, steep = (x - shift) / width, slopes.in_units(width)
+    spots = np.vstack([z, z[steep.at] + AWAY * steep.ways])
+    spots = spots[random.permutation(len(spots))[:inducing]] if len(spots) > inducing else spots
+    if like:
+        metric, noises = like.metric, (like.noise, like.common_noise, like.slope_noise)
+    if again or not like:
+        some, steepest = (random.permutation(len(a))[:most] for a in (z, steep.at))
+        extra = EXTRA if len(steep.at) else 0
+        starts = [_logarithms(metric, noises)] if like else [_start(z.shape[1], extra, *s) for s in STARTS]
+        metric, noises = _most_likely(z, y, group, trust, some, steep.of(steepest), starts, MORE_STEPS if like else MOST_STEPS)
+    return _condition(z, y, group, trust, spots, steep, shift, width, metric, noises)
+
+
+def _most_likely(z, y, group, trust, some, slopes, starts, steps):
+    """(metric, (noise, common noise, noise of slopes)) by the observations `some` and all slopes."""
+    d = z.shape[1]
+    points = np.vstack([z[some], z[slopes.at] - NEAR / 2 * slopes.ways, z[slopes.at] + NEAR / 2 * slopes.ways])
+    data = []
+    for columns in _alike(trust):
+        t, v = trust[some, columns[0]], y[np.ix_(some, columns)]
+        centred = v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum()
+        data.append((np.vstack([centred, slopes.values[:, columns]]), 1 / np.append(t, trust[slopes.at, columns[0]])))
     same = group[some][:, None] == group[some]
-    found = minimize(
-        _misfit,
-        np.append(np.full(z.shape[1], np.log(3.0)), np.log([1e-4, 1e-4])),
-        (z[some], centred, same),
-        jac=True,
-        method="L-BFGS-B",
-        bounds=[LOG_SCALE] * z.shape[1] + [LOG_NOISE] * 2,
-        options={"maxiter": 100},
-    )
-    return _condition(z, y, group, trust, order, inducing, shift, width, np.exp(found.x[:-2]), *np.exp(found.x[-2:]).tolist())
+    bounds = [LOG_SCALE] * d + [(None, None)] * (len(starts[0]) - d - 3) + list(LOG_NOISES)
+    settings = {"jac": True, "method": "L-BFGS-B", "bounds": bounds, "options": {"maxiter": steps}}
+    best = min((minimize(_misfit, start, (points, data, same), **settings) for start in starts), key=lambda result: result.fun).x
+    return _metric(best, d), tuple(np.exp(best[-3:]).tolist())
+
+
+def _start(d, extra, scale, *noises):
+    mixed = 0.1 * np.random.default_rng(0).normal(size=(d, extra))
+    return _logarithms(np.hstack([np.eye(d) / scale, mixed]), noises)
+
+
+def _logarithms(metric, noises):
+    """What the likelihood is a function of: logarithms of scales and noises, and the directions between them as they are."""
+    d = len(metric)
+    return np.concatenate([-np.log(np.diag(metric)), metric[:, d:].T.ravel(), np.log(noises)])
+
+
+def _metric(log, d):
+    """(d, d + extra) of `_logarithms`."""
+    return np.hstack([np.diag(np.exp(-log[:d])), log[d:-3].reshape(-1, d).T])
 
 
 def _alike(trust):
@@ -158,36 +231,51 @@ def _alike(trust):
 
 
 class _System:
-    """Least-squares rows of observations at z (n, d), the first m of which are the inducing points, and of the prior."""
+    """Least-squares rows of observations at z (n, d), of slopes there, and of the prior, by weights of kernels at spots (m, d)."""
 
-    def __init__(self, z, group, m, scales, noise, common_noise):
-        points, d = z[:m] / scales, z.shape[1]
-        kernel_root = cholesky(_kernel(points, points) + JITTER * np.eye(len(points)), lower=True)
-        self.basis = np.hstack([_kernel(z / scales, points), np.ones((len(z), 1)), z])
-        self.prior = np.zeros((self.basis.shape[1],) * 2)
-        self.prior[: len(points), : len(points)], self.prior[len(points) :, len(points) :] = kernel_root.T, np.eye(1 + d) / np.sqrt(TREND)
-        self.white, self._noise = _whitener(group, common_noise / noise), noise
+    def __init__(self, z, group, at, ways, spots, metric, noises):
+        noise, common_noise, slope_noise = noises
+        points, a, m = spots @ metric, z @ metric, len(spots)
+        kernel = _kernel(a, points)
+        kernel_root = cholesky(_kernel(points, points) + JITTER * np.eye(m), lower=True)
+        # d k(a, b)/d a = k (b - a)
+        t = ways @ metric
+        along = kernel[at] * (t @ points.T - (t * a[at]).sum(axis=1)[:, None])
+        self._values = np.hstack([kernel, np.ones((len(z), 1)), z])
+        self._slopes = np.hstack([along, np.zeros((len(at), 1)), ways])
+        self._at, self._weight = at, np.sqrt(noise / slope_noise)
+        size = self._values.shape[1]
+        self.prior = np.zeros((size, size))
+        self.prior[:m, :m], self.prior[m:, m:] = kernel_root.T, np.eye(size - m) / np.sqrt(TREND)
+        self._white, self._noise = _whitener(group, common_noise / noise), noise
 
     def rows(self, trust):
-        """(n + m + 1 + d, m + 1 + d) for observations of this trust (n, 1)."""
-        return np.vstack([self.white(trust * self.basis), np.sqrt(self._noise) * self.prior])
+        """(n + r + size, size) for observations of this trust (n,)."""
+        return np.vstack([self.weighed(self._values, self._slopes, trust), np.sqrt(self._noise) * self.prior])
+
+    def weighed(self, values, slopes, trust):
+        """(n + r, .) of (n, .) and (r, .): each with unit noise."""
+        t = trust[:, None]
+        return np.vstack([self._white(t * values), self._weight * t[self._at] * slopes])
 
 
-def _condition(z, y, group, trust, order, inducing, shift, width, scales, noise, common_noise):
-    z, y, group, trust, m = z[order], y[order], group[order], trust[order], min(inducing, len(z))
-    system = _System(z, group, m, scales, noise, common_noise)
-    weights, variance = np.zeros((system.basis.shape[1], y.shape[1])), np.zeros(y.shape[1])
+def _condition(z, y, group, trust, spots, slopes, shift, width, metric, noises):
+    at, m, p = slopes.at, len(spots), y.shape[1]
+    system = _System(z, group, at, slopes.ways, spots, metric, noises)
+    size = m + 1 + z.shape[1]
+    weights, variance = np.zeros((size, p)), np.zeros(p)
     for columns in _alike(trust):
-        t = trust[:, columns[0]][:, None]
-        shifted = (t**2 * y[:, columns]).sum(axis=0) / (t**2).sum()
-        right = system.white(t * (y[:, columns] - shifted))
-        q, r = qr(system.rows(t), mode="economic")
-        w = solve_triangular(r, q[: len(z)].T @ right)
-        missed = right - system.white(t * system.basis) @ w
-        variance[columns] = ((missed**2).sum(axis=0) / noise + ((system.prior @ w) ** 2).sum(axis=0)) / len(z)
+        t, k = trust[:, columns[0]], len(columns)
+        shifted = (t[:, None] ** 2 * y[:, columns]).sum(axis=0) / (t**2).sum()
+        right = np.zeros((len(z) + len(at) + size, k))
+        right[:-size] = system.weighed(y[:, columns] - shifted, slopes.values[:, columns], t)
+        # of [A b] = Q R the last columns hold Q^T b and, below, what no weights can fit
+        r = qr(np.hstack([system.rows(t), right]), mode="r", overwrite_a=True, check_finite=False)[0][: size + k]
+        w = solve_triangular(r[:size, :size], r[:size, size:])
+        variance[columns] = (r[size:, size:] ** 2).sum(axis=0) / noises[0] / (len(z) + len(at))
         w[m] += shifted
         weights[:, columns] = w
-    return GaussianProcess(shift, width, z, group, m, trust[:, 0], scales, weights, variance, noise, common_noise)
+    return GaussianProcess(shift, width, spots, z, group, trust[:, 0], at, slopes.ways, metric, weights, variance, *noises)
 
 
 def _whitener(group, ratio):
@@ -203,27 +291,49 @@ def _whitener(group, ratio):
     return white
 
 
-def _misfit(log, z, data, same):
-    """Minus the log likelihood, each output's variance profiled out, and its gradient by the logarithms of scales and noises."""
-    n, scales, noises = len(z), np.exp(log[:-2]), np.exp(log[-2:])
-    a = z / scales
+def _misfit(log, points, data, same):
+    """Minus the log likelihood, each output's variance profiled out, and its gradient by `_logarithms`.
+
+    points: of the observations, then both ends of the slopes; data: [(y, doubt)] of observations and slopes.
+    """
+    n, r = len(same), (len(points) - len(same)) // 2
+    d, noises = points.shape[1], np.exp(log[-3:])
+    metric = _metric(log, d)
+    a = points @ metric
     kernel = _kernel(a, a)
-    prior = kernel + TREND * (1 + z @ z.T)
-    value, outer_sum, by_noise = 0.0, np.zeros((n, n)), np.zeros(2)
+    plane = _differences(np.hstack([np.ones((len(points), 1)), points]), n)
+    prior = _differences(_differences(kernel, n).T, n) + TREND * plane @ plane.T
+    value, outer_sum, by_noise = 0.0, np.zeros((n + r, n + r)), np.zeros(3)
+    own = np.repeat(noises[[0, 2]], [n, r])
     for y, doubt in data:
         p = y.shape[1]
-        noise = np.outer(doubt, doubt) * (noises[0] * np.eye(n) + noises[1] * same)
-        try:
-            factor = cho_factor(prior + noise, lower=True)
-        except np.linalg.LinAlgError:
+        noise = np.diag(own * doubt**2)
+        noise[:n, :n] += np.outer(doubt[:n], doubt[:n]) * (noises[1] * same)
+        factor, failed = lapack.dpotrf(prior + noise, lower=True, overwrite_a=True)
+        if failed:
             return 1e10, np.zeros(len(log))
-        weights = cho_solve(factor, y)
-        variance = (y * weights).sum(axis=0) / n
-        value += n / 2 * np.log(variance).sum() + p * np.log(np.diag(factor[0])).sum()
-        outer = p / 2 * cho_solve(factor, np.eye(n)) - (weights / variance) @ weights.T / 2
+        value += p * np.log(np.diag(factor)).sum()
+        inverse, _ = lapack.dpotri(factor, lower=True, overwrite_c=True)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        weights = inverse @ y
+        variance = (y * weights).sum(axis=0) / (n + r)
+        value += (n + r) / 2 * np.log(variance).sum()
+        outer = p / 2 * inverse - (weights / variance) @ weights.T / 2
         outer_sum += outer
-        doubted = outer * np.outer(doubt, doubt)
-        by_noise += noises * [np.trace(doubted), doubted[same].sum()]
-    s = outer_sum * kernel
-    by_scale = 2 * (s.sum(axis=1) @ a**2 - (a * (s @ a)).sum(axis=0))
-    return value, np.append(by_scale, by_noise)
+        single, doubted = np.diag(outer) * doubt**2, outer[:n, :n] * np.outer(doubt[:n], doubt[:n])
+        by_noise += noises * [single[:n].sum(), doubted[same].sum(), single[n:].sum()]
+    s = _spread_out(_spread_out(outer_sum, n).T, n) * kernel
+    by_metric = -2 * points.T @ (s.sum(axis=1)[:, None] * a - s @ a)
+    by_scale = -np.diag(by_metric[:, :d] * metric[:, :d])
+    return value, np.concatenate([by_scale, by_metric[:, d:].T.ravel(), by_noise])
+
+
+def _differences(rows, n):
+    """(n + r, .) observations and slopes of the values (n + 2 r, .) at the points of `_misfit`."""
+    start, end = np.split(rows[n:], 2)
+    return np.vstack([rows[:n], (end - start) / NEAR])
+
+
+def _spread_out(rows, n):
+    """Transpose of `_differences`."""
+    return np.vstack([rows[:n], -rows[n:] / NEAR, rows[n:] / NEAR])

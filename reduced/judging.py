@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from base.se3 import exp_pose
-from reduced.law_coordinates import cosine
-from reduced.potential import whitening
+from reduced.potential import anharmonic_gradient, whitening
 
 #: mm; of the free segment whose tip is compared
 TIP_LENGTH = 100.0
@@ -43,7 +42,7 @@ def force_error(law, sample):
     K = law.stiffness_at(f.shape, free)
     M, D1 = whitening(law.kind, K)
     v = np.einsum("nij,nj->ni", M, f.strains + sample.change - free)
-    by_v = D1[:, None] * (v + law.anharmonic.gradient(v, cosine(f.shape)))
+    by_v = D1[:, None] * (v + anharmonic_gradient(v, law.anharmonic_at(f.shape, free)))
     forces = np.einsum("nij,ni->nj", M, by_v)
     own, _ = whitening(law.kind, symmetric(f.matrices))
     white = [np.linalg.solve(np.swapaxes(own, 1, 2), x[..., None])[..., 0] for x in (forces - sample.forces, sample.forces)]

@@ -19,9 +19,9 @@ from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
 from reduced.gaussian import GaussianProcess, SideBySide
 from reduced.law_coordinates import LENGTHS, Coordinates, cosine
 from reduced.model import SegmentLaw, checked_pressure
-from reduced.potential import Anharmonic, whitening
+from reduced.potential import Anharmonic, anharmonic_gradient, anharmonic_hessian, anharmonic_value, whitening
 
-SCHEMA = "pneunet-law-2"
+SCHEMA = "pneunet-law-3"
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so
 TIE_TOLERANCE = 0.02
 #: lowest P/mu: the free strains are divided by it
@@ -72,6 +72,10 @@ class KindLaw:
         """(n, 6, 6) the same, of free states with these strains (n, 6)."""
         co = self.coordinates
         return co.stiffness(shape, self.stiffness(co.stiffness_inputs(shape, strains, self.level)))
+
+    def anharmonic_at(self, shape, strains):
+        """What reduced.potential's anharmonic forms are made of around free states with these strains (n, 6)."""
+        return self.anharmonic.at(self.coordinates.around_inputs(shape, strains), cosine(shape))
 
     def half_width(self, shape, pressure):
         """(n, 6) half of the 90 % interval of each free strain."""
@@ -157,10 +161,10 @@ class SectionLaw:
         object.__setattr__(self, "_known", lru_cache(maxsize=64)(self._free_state))
 
     def _free_state(self, *pressures):
-        """(free strains (n, 6), M (n, 6, 6), D1 (n,)) without dimension at pressures in MPa."""
+        """(free strains (n, 6), M (n, 6, 6), D1 (n,), cubic (n, 6, 36), quartic (n, 36, 36)) without dimension at pressures in MPa."""
         shape, p = self._rows(pressures)
         free = self.law.free_strains(shape, p)
-        return free, *whitening(self.law.kind, self.law.stiffness_at(shape, free))
+        return free, *whitening(self.law.kind, self.law.stiffness_at(shape, free)), *self.law.anharmonic_at(shape, free)
 
     def _rows(self, P):
         p = np.atleast_1d(np.asarray(P, float)).ravel() / self.mu
@@ -191,34 +195,34 @@ class SectionLaw:
         return self.remarks + tuple(reasons)
 
     def _state(self, q, P):
-        """(shape of the answer, v (n, 6), M (n, 6, 6), D1 (n,), c (n,))."""
+        """(shape of the answer, v (n, 6), M (n, 6, 6), D1 (n,), anharmonic tensors)."""
         lead = np.broadcast_shapes(np.shape(q)[:-1], np.shape(P))
         q = np.broadcast_to(q, (*lead, 6)).reshape(-1, 6)
         if np.ndim(P):
             pressures, back = np.unique(np.asarray(P, float), return_inverse=True)
             i = np.broadcast_to(back.reshape(np.shape(P)), lead).ravel()
-            free, M, D1 = (a[i] for a in self._free_state(*pressures))
+            free, M, D1, *tensors = (a[i] for a in self._free_state(*pressures))
         else:
-            free, M, D1 = self._known(float(P))
+            free, M, D1, *tensors = self._known(float(P))
         v = (M @ (q * self._scale - free)[:, :, None])[:, :, 0]
-        return lead, v, M, D1, np.broadcast_to(cosine(self.shape[None]), len(q))
+        return lead, v, M, D1, tensors
 
     def psi(self, q, P):
         """(...,) enthalpy per undeformed length, N; 0 at the free state."""
-        lead, v, _, D1, c = self._state(q, P)
-        return (self.mu * self.length**2 * D1 * ((v**2).sum(axis=1) / 2 + self.law.anharmonic.value(v, c))).reshape(lead)
+        lead, v, _, D1, tensors = self._state(q, P)
+        return (self.mu * self.length**2 * D1 * ((v**2).sum(axis=1) / 2 + anharmonic_value(v, tensors))).reshape(lead)
 
     def force(self, q, P):
         """(..., 6) gradient of psi: force (N) and moment (N mm) in the section frame."""
-        lead, v, M, D1, c = self._state(q, P)
-        by_v = D1[:, None] * (v + self.law.anharmonic.gradient(v, c))
+        lead, v, M, D1, tensors = self._state(q, P)
+        by_v = D1[:, None] * (v + anharmonic_gradient(v, tensors))
         force = (by_v[:, None, :] @ M)[:, 0]
         return (self.mu * self.length**2 * force * self._scale).reshape(*lead, 6)
 
     def stiffness(self, q, P):
         """(..., 6, 6) Hessian of psi, N, N mm and N mm2."""
-        lead, v, M, D1, c = self._state(q, P)
-        by_v = D1[:, None, None] * (np.eye(6) + self.law.anharmonic.hessian(v, c))
+        lead, v, M, D1, tensors = self._state(q, P)
+        by_v = D1[:, None, None] * (np.eye(6) + anharmonic_hessian(v, tensors))
         K = np.swapaxes(M, 1, 2) @ by_v @ M
         return (self.mu * self.length**2 * K * np.outer(self._scale, self._scale)).reshape(*lead, 6, 6)
 
@@ -245,8 +249,9 @@ def _ties(segment):
 
 
 #: fields of the Gaussian processes side by side that are the same in all of them
-COMMON = ("shift", "width", "observed", "group", "inducing")
-NUMBERS = {"noise": float, "common_noise": float, "inducing": int}
+COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
+ANHARMONIC = ("coefficients", "centre", "width", "reach")
+NUMBERS = {"noise": float, "common_noise": float, "slope_noise": float}
 
 
 def write_law(path, law):
@@ -258,7 +263,7 @@ def write_law(path, law):
                 for f in fields(GaussianProcess):
                     arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name))
         arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
-        arrays |= {f"{kind}/coefficients": k.anharmonic.coefficients, f"{kind}/reach": np.asarray(k.anharmonic.reach)}
+        arrays |= {f"{kind}/anharmonic/{name}": np.asarray(getattr(k.anharmonic, name)) for name in ANHARMONIC}
     about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": {k: list(v) for k, v in LENGTHS.items()}, **law.about}
     write_archive(path, SCHEMA, about, arrays, compress=True)
 
@@ -284,6 +289,6 @@ def _read_kind(stored, kind):
             number += 1
     processes = {name: SideBySide(tuple(found)) for name, found in processes.items()}
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
-    anharmonic = Anharmonic(kind, stored[f"{kind}/coefficients"], float(stored[f"{kind}/reach"]))
+    anharmonic = Anharmonic(kind, *(stored[f"{kind}/anharmonic/{name}"] for name in ANHARMONIC))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])
     return KindLaw(kind, **processes, anharmonic=anharmonic, **plain, doubt=doubt, level=level)

@@ -65,6 +65,10 @@ class Coordinates:
         x[:, -2] = strains[:, lead] - REST[lead]
         return x
 
+    def around_inputs(self, shape, strains):
+        """(n, d - 1) what the enthalpy around free states depends on: the same, whatever the mesh."""
+        return self.stiffness_inputs(shape, strains, 0)[:, :-1]
+
     @cached_property
     def _sums(self):
         """(13, d) from shape numbers to LENGTHS."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from base.dataset import full_matrices
 from reduced.law_coordinates import REST, Coordinates
 
 #: held-out designs that suffice to judge a law; with fewer the training designs are judged too, by laws that have not seen them
@@ -15,7 +16,8 @@ PARTS = 10
 @dataclass(frozen=True)
 class States:
     """Free states of one kind, rest included: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers,
-    level (n,) of the mesh, the finest last, and size (n,): norm of the free strains, rest taken off, at the case's top pressure."""
+    level (n,) of the mesh, the finest last, and size (n,): norm of the free strains, rest taken off, at the case's top pressure.
+    strain_slopes (n, s, 6), matrix_slopes (n, s, 6, 6): derivatives along the `directions` (s, 13) of shape, nan where not known."""
 
     kind: str
     shape: np.ndarray
@@ -25,9 +27,12 @@ class States:
     design: np.ndarray
     level: np.ndarray
     size: np.ndarray
+    strain_slopes: np.ndarray
+    matrix_slopes: np.ndarray
+    directions: np.ndarray
 
     def of(self, chosen):
-        return States(self.kind, *(getattr(self, f.name)[chosen] for f in fields(self)[1:]))
+        return States(self.kind, *(getattr(self, f.name)[chosen] for f in fields(self)[1:-1]), self.directions)
 
     @property
     def loaded(self):
@@ -83,6 +88,7 @@ def sample_of(data, kind, held_out):
     level = np.argsort(np.argsort(-np.array(sizes)))
     rows = np.flatnonzero(cases[data.case] & ~data.overlapping)
     free, held = rows[~data.prescribed[rows]], rows[data.prescribed[rows]]
+    directions = np.array(data.about["directions"][kind])
     top = {}
     for i in free:  # pressures increase
         top[data.case[i]] = np.linalg.norm(data.strains[i] - REST)
@@ -93,6 +99,9 @@ def sample_of(data, kind, held_out):
         data.design[data.case[free]],
         level[data.mesh[data.case[free]]],
         np.array([top[data.case[i]] for i in free]),
+        data.strain_slopes[free, : len(directions)].astype(float),
+        full_matrices(data.stiffness_slopes[free, : len(directions)].astype(float)),
+        directions,
     )
     held = np.array([i for i in held if (data.case[i], round(float(data.pressure[i]), 6)) in at], int)
     where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)

@@ -1,10 +1,11 @@
 """`pneunet train`: the rod law from the data set of cells, and how well it does on designs that it has not seen.
 
-Three laws are compared for the free strains: the analytic models with one fitted factor for each strain, the regressor alone, and
-the regressor for what the analytic models leave. The law that is written is the regressor alone: the analytic cell costs
-milliseconds a state. Intervals come from the residuals of a cross-validation by design (conformal, with the Gaussian process's
-deviation as their shape); nothing of the held-out designs is used before the last table. Where they are few, laws trained on parts
-of the training designs are judged on the other ones too (reduced.states.splits), with scales and noise of the whole law.
+Compared for the free strains, on the held-out designs: the analytic models with one fitted factor for each strain, the regressor
+alone, the regressor for what the analytic models leave, and the regressor that learns from derivatives by the shape too. The law
+that is written is the last one: the analytic cell costs milliseconds a state. Intervals come from the residuals of a
+cross-validation by design (conformal, with the Gaussian process's deviation as their shape); nothing of the held-out designs is
+used before the last table. Where they are few, laws trained on parts of the training designs are judged on the other ones too
+(reduced.states.splits); they find metric and noise anew.
 """
 
 import hashlib
@@ -37,36 +38,82 @@ MARGIN = 0.02
 #: a deviation above this many times the largest one at the training points is outside
 DOUBT = 2.0
 
+#: step of central differences along directions of shape (degrees, normal pitches): the transformations are smooth there
+STEP = 1e-4
+
+#: of the leading strain's logarithm over a standard deviation of the inputs: above that a state is next to its limit load, where
+#: derivatives grow without bound
+STEEPEST = 1.0
+#: of the angle, below which derivatives along it are not used
+SMALLEST_COSINE = 0.2
+
 # ---- fitting
 
 
-def fit_strains(states, like=None):
-    """Gaussian processes of the learned free strains: the leading one has scales of its own (measured: a quarter off its error)."""
+def slopes_of(states, known, inputs, outputs, some):
+    """gaussian.Slopes of the states where they are `known` (n, s), among those that are `some` (n,).
+
+    inputs, outputs: functions of (shape, strains, matrices, states) that give what the process sees.
+    """
+    at, way = np.nonzero(known & some[:, None])
+    s, change = states.of(at), (states.directions[way], states.strain_slopes[at, way], states.matrix_slopes[at, way])
+    ends = [[a + sign * STEP * b for a, b in zip((s.shape, s.strains, s.matrices), change)] for sign in (1, -1)]
+    ways, values = ((f(*ends[0], s) - f(*ends[1], s)) / (2 * STEP) for f in (inputs, outputs))
+    return gaussian.Slopes((np.cumsum(some) - 1)[at], ways, values)
+
+
+def told_by_angle(states):
+    """(n, s) bool: not along the angle near 90 degrees, where what is odd in its cosine is divided by it."""
+    return (np.abs(cosine(states.shape)) > SMALLEST_COSINE)[:, None] | (states.directions[:, 0] == 0)
+
+
+def fit_strains(states, like=None, again=False, slopes=True):
+    """Gaussian processes of the learned free strains: the leading one has a metric of its own (measured: a quarter off its error)."""
     states = states.loaded
     co = Coordinates(states.kind)
-    with np.errstate(invalid="ignore"):
-        y = co.learned_strains(states.shape, states.pressure, states.strains)
+
+    def outputs(shape, strains, matrices, s):
+        with np.errstate(invalid="ignore"):
+            return co.learned_strains(shape, s.pressure, strains)
+
+    y = outputs(states.shape, states.strains, None, states)
     good = np.isfinite(y).all(axis=1)  # the leading strain is larger than 0
     trust = odd(co.strain_parity, np.abs(cosine(states.shape)))
-    return gaussian.fit_side_by_side(states.inputs[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), like)
+    steep = None
+    if slopes:
+        known = np.isfinite(states.strain_slopes).all(axis=2) & told_by_angle(states)
+        steep = slopes_of(states, known, lambda shape, strains, matrices, s: co.inputs(shape, s.pressure, s.level), outputs, good)
+        size = np.linalg.norm(steep.ways / np.maximum(states.inputs.std(axis=0), 1e-12), axis=1)
+        steep = steep.of(np.abs(steep.values[:, 0]) < STEEPEST * size)
+    return gaussian.fit_side_by_side(states.inputs[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), steep, like, again)
 
 
-def fit_stiffness(states, like=None):
+def fit_stiffness(states, like=None, again=False):
     """Gaussian process of the learned stiffness."""
     co = Coordinates(states.kind)
-    y = co.learned_stiffness(states.shape, states.matrices)
+
+    def inputs(shape, strains, matrices, s):
+        return co.stiffness_inputs(shape, strains, s.level)
+
+    def outputs(shape, strains, matrices, s):
+        return co.learned_stiffness(shape, matrices)
+
+    y = outputs(states.shape, None, states.matrices, states)
     good = np.isfinite(y).all(axis=1)
     trust = odd(co.stiffness_parity, np.abs(cosine(states.shape)))
-    x = co.stiffness_inputs(states.shape, states.strains, states.level)
-    return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (y.shape[1],), like)
+    known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states)
+    steep = slopes_of(states, known, inputs, outputs, good)
+    x = inputs(states.shape, states.strains, None, states)
+    return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (y.shape[1],), steep, like, again)
 
 
 def fit_kind(sample, like=None):
-    """The KindLaw of a Sample; `like`: another one whose scales and noise are taken as they are."""
+    """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts."""
     states, around = sample.free, sample.around
-    strains = fit_strains(states, like and like.strains)
-    stiffness = fit_stiffness(states, like and like.stiffness)
-    anharmonic = fit_anharmonic(states.kind, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces)
+    strains = fit_strains(states, like and like.strains, again=True)
+    stiffness = fit_stiffness(states, like and like.stiffness, again=True)
+    x = Coordinates(states.kind).around_inputs(around.shape, around.strains)
+    anharmonic = fit_anharmonic(states.kind, x, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces)
     x = states.inputs
     doubt = DOUBT * float(strains.deviation(x)[:, 0].max())
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
@@ -90,7 +137,7 @@ def _quantiles(law, states):
 
 
 def judge_again(law, learned, judged):
-    """`misses` on a Sample of the law that another Sample gives with the scales and noise of `law`."""
+    """`misses` on a Sample of the law that another Sample gives."""
     return misses(fit_kind(learned, law), judged)
 
 
@@ -116,44 +163,28 @@ def analytic_strains(states):
 
 def compare_laws(training, held_out):
     """[(law of the free strains, median error, 95th percentile, share without an answer)] on the coarsest mesh."""
-    pairs = [tuple(sample.on(0).free.loaded for sample in pair) for pair in splits(training, held_out)]
-    known = {}
-    for states in pairs[0]:
-        strains = analytic_strains(states)
-        known |= {number: strains[states.design == number] for number in np.unique(states.design)}
-    errors, like = {}, [None, None]
-    for states in pairs:
-        a = []
-        for s in states:
-            a.append(np.empty(s.strains.shape))
-            for number in np.unique(s.design):
-                a[-1][s.design == number] = known[number]
-        found, like = _three_laws(*states, *a, like)
-        for name, strains in found.items():
-            errors.setdefault(name, []).append(strain_error(states[1], strains))
-    return [(name, *_spread(np.concatenate(e)), float(np.mean(np.isnan(np.concatenate(e))))) for name, e in errors.items()]
-
-
-def _three_laws(train, test, a_train, a_test, like):
-    """({law: strains (n, 6) of the test states}, the two processes, whose scales serve the next ones)."""
+    train, test = (sample.on(0).free.loaded for sample in (training, held_out))
+    a_train, a_test = (analytic_strains(states) for states in (train, test))
     co = Coordinates(train.kind)
     good = np.isfinite(a_train).all(axis=1)
     w = 1 / train.size[good, None]
     a, q = (a_train[good] - REST) * w, (train.strains[good] - REST) * w
     factor = (a * q).sum(axis=0) / np.maximum((a * a).sum(axis=0), 1e-30)
-    alone = fit_strains(train, like[0])
     with np.errstate(invalid="ignore", divide="ignore"):
         learned = [co.learned_strains(s.shape, s.pressure, a) for s, a in ((train, a_train), (test, a_test))]
     y = co.learned_strains(train.shape, train.pressure, train.strains) - learned[0]
     good = np.isfinite(y).all(axis=1)
     trust = odd(co.strain_parity, np.abs(cosine(train.shape)))
-    rest = gaussian.fit_side_by_side(train.inputs[good], y[good], train.case[good], trust[good], (1, y.shape[1] - 1), like[1])
+    rest = gaussian.fit_side_by_side(train.inputs[good], y[good], train.case[good], trust[good], (1, y.shape[1] - 1))
+    regressors = [fit_strains(train, slopes=slopes)(test.inputs) for slopes in (False, True)]
     laws = {
         "calibrated analytic model": REST + factor * (a_test - REST),
-        "regressor": co.strains(test.shape, test.pressure, alone(test.inputs)),
-        "analytic model and regressor": co.strains(test.shape, test.pressure, learned[1] + rest(test.inputs)),
+        "regressor of the states": co.strains(test.shape, test.pressure, regressors[0]),
+        "analytic model and regressor of the states": co.strains(test.shape, test.pressure, learned[1] + rest(test.inputs)),
+        "regressor of the states and their derivatives by the shape": co.strains(test.shape, test.pressure, regressors[1]),
     }
-    return laws, (alone, rest)
+    errors = {name: strain_error(test, strains) for name, strains in laws.items()}
+    return [(name, *_spread(e), float(np.isnan(e).mean())) for name, e in errors.items()]
 
 
 def _spread(error):
@@ -163,16 +194,12 @@ def _spread(error):
 
 def learning_curve(training, held_out):
     """[(designs trained on, median error, 95th percentile)] of the free strains for the first parts of the training designs."""
-    pairs = [tuple(sample.on(0).free.loaded for sample in pair) for pair in splits(training, held_out)]
-    co, rows = Coordinates(pairs[0][0].kind), []
+    states, test = (sample.on(0).free.loaded for sample in (training, held_out))
+    co, numbers, rows = Coordinates(states.kind), np.unique(states.design), []
     for part in CURVE:
-        errors, process = [], None
-        for states, test in pairs:
-            numbers = np.unique(states.design)
-            some = states.of(np.isin(states.design, numbers[: max(8, round(part * len(numbers)))]))
-            process = fit_strains(some, process)
-            errors.append(strain_error(test, co.strains(test.shape, test.pressure, process(test.inputs))))
-        rows.append((max(8, round(part * len(np.unique(pairs[0][0].design)))), *_spread(np.concatenate(errors))))
+        some = numbers[: max(8, round(part * len(numbers)))]
+        process = fit_strains(states.of(np.isin(states.design, some)))
+        rows.append((len(some), *_spread(strain_error(test, co.strains(test.shape, test.pressure, process(test.inputs))))))
     return rows
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from base.dataset import read_dataset
+from base.dataset import columns, read_dataset
 
 ROOT = Path(__file__).resolve().parents[2]
 CAMPAIGN = """kinds = ["one-sided"]
@@ -19,16 +19,17 @@ top_pressure_over_mu = 0.1
 name = "coarse"
 mesh_size_mm = 6
 prescribed = 2
+slopes = true
 """
 
 
-def campaign(ranks, folder, designs):
+def campaign(ranks, folder, designs, output="out", *options):
     (folder / "campaign.toml").write_text(CAMPAIGN.format(designs=designs))
-    command = [sys.executable, "-m", "pneunet", "campaign", str(folder / "campaign.toml"), "-o", str(folder / "out")]
+    command = [sys.executable, "-m", "pneunet", "campaign", str(folder / "campaign.toml"), "-o", str(folder / output), *options]
     line = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), "--", *command]
     done = subprocess.run(line, capture_output=True, text=True, timeout=300, cwd=ROOT)
     assert done.returncode == 0, done.stderr
-    return done.stdout, read_dataset(folder / "out" / "cells.npz")
+    return done.stdout, read_dataset(folder / output / "cells.npz")
 
 
 def test_a_campaign_grows_and_its_states_are_those_of_one_potential(tmp_path):
@@ -38,6 +39,15 @@ def test_a_campaign_grows_and_its_states_are_those_of_one_potential(tmp_path):
     assert data.accepted.all() and data.held_out.tolist() == [False, True]
     assert (data.strains[data.case == 0] == first.strains).all()
     assert (tmp_path / "out" / "cells.md").read_text().startswith("# Data set of unit cells")
+    # derivatives by the shape, of designs that train a law
+    known = np.isfinite(data.strain_slopes[:, :9]).all(axis=(1, 2))
+    assert (known == ((data.case == 0) & ~data.prescribed)).all() and np.isnan(data.strain_slopes[:, 9]).all()
+    assert np.isfinite(data.stiffness_slopes[:, :9]).all(axis=(1, 2)).sum() == 1  # of the state at rest
+    # from the data alone it goes on elsewhere
+    text, again = campaign(1, tmp_path, 2, "other", "--extend", str(tmp_path / "out" / "cells.npz"))
+    assert "2 of them are taken over" in text
+    for f in columns():
+        assert np.array_equal(getattr(again, f.name), getattr(data, f.name), equal_nan=f.metadata["type"] == "f4"), f.name
     for row in (0, 1):
         free = np.flatnonzero((data.case == row) & ~data.prescribed)
         held = np.flatnonzero((data.case == row) & data.prescribed)

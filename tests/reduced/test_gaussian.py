@@ -1,7 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from reduced.gaussian import TREND, _misfit, fit
+from reduced.gaussian import NEAR, TREND, Slopes, _misfit, fit
 
 
 def observed(n, seed=0):
@@ -15,21 +17,24 @@ def observed(n, seed=0):
 
 def test_the_likelihood_has_its_gradient():
     x, y, group = observed(30)
-    doubt = np.linspace(1, 3, 10)[group]
-    data, same = [(y[:, :1], np.ones(30)), (y[:, 1:], doubt)], group[:, None] == group
-    at, h = np.log([2.0, 1.0, 1e-2, 5e-2]), 1e-5
-    ends = [[_misfit(at + s * h * e, x, data, same)[0] for s in (1, -1)] for e in np.eye(4)]
+    x, same = np.vstack([x, x[:9] - NEAR / 2, x[:9] + NEAR / 2]), group[:, None] == group
+    y = np.vstack([y, np.linspace(-1, 2, 18).reshape(9, 2)])
+    doubt = np.append(np.linspace(1, 3, 10)[group], np.ones(9))
+    data = [(y[:, :1], np.ones(39)), (y[:, 1:], doubt)]
+    at, h = np.append(np.log([2.0, 1.0]), [0.3, -0.2, *np.log([1e-2, 5e-2, 3e-2])]), 1e-4
+    ends = [[_misfit(at + s * h * e, x, data, same)[0] for s in (1, -1)] for e in np.eye(7)]
     assert [(a - b) / (2 * h) for a, b in ends] == pytest.approx(_misfit(at, x, data, same)[1], rel=1e-5, abs=1e-4)
 
 
 def test_with_all_points_it_is_the_textbook_s_process():
     x, y, group = observed(30)
-    process = fit(x, y, group)
+    found = fit(x, y, group)
+    process = fit(x, y, group, like=replace(found, metric=np.diag([1.0, 0.5]), noise=1e-3, common_noise=1e-2))
     z = (x - process.shift) / process.width
     new = (np.array([[0.3, -0.4], [2.0, 2.0]]) - process.shift) / process.width
 
     def prior(a, b):
-        return np.exp(-0.5 * (((a[:, None] - b) / process.scales) ** 2).sum(axis=2)) + TREND * (1 + a @ b.T)
+        return np.exp(-0.5 * (((a[:, None] - b) @ process.metric) ** 2).sum(axis=2)) + TREND * (1 + a @ b.T)
 
     noise = process.noise * np.eye(30) + process.common_noise * (group[:, None] == group)
     inverse = np.linalg.inv(prior(z, z) + noise)
@@ -38,6 +43,20 @@ def test_with_all_points_it_is_the_textbook_s_process():
     inputs = new * process.width + process.shift
     assert process(inputs) == pytest.approx(mean, rel=1e-3)  # jitter, far outside
     assert process.deviation(inputs) ** 2 / process.variance == pytest.approx(np.column_stack([spread, spread]), rel=5e-3, abs=1e-6)
+
+
+def test_slopes_are_followed_and_spare_observations():
+    x, y, group = observed(12)
+    at, ways = np.arange(12), np.random.default_rng(3).normal(size=(12, 2))
+    steep = np.column_stack([2 * np.cos(2 * x[:, 0]) * ways[:, 0] + ways[:, 1], x[:, 1] * ways[:, 0] + x[:, 0] * ways[:, 1]])
+    process, without = fit(x, y, group, slopes=Slopes(at, ways, steep)), fit(x, y, group)
+    _, found = process(x, derivative=True)
+    assert np.einsum("npd,nd->np", found, ways) == pytest.approx(steep, abs=0.02)
+    new = observed(30, seed=1)[0]
+    truth = np.column_stack([np.sin(2 * new[:, 0]) + new[:, 1], new[:, 0] * new[:, 1]])
+    errors = [np.sqrt(((p(new) - truth) ** 2).mean()) for p in (process, without)]
+    assert errors[0] < 0.3 * errors[1], errors
+    assert (process.deviation(new).mean(axis=0) < without.deviation(new).mean(axis=0)).all()
 
 
 def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():

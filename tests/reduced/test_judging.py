@@ -16,6 +16,8 @@ def sample(designs):
     n = len(designs)
     values = {"shape": np.ones((2 * n, 13)), "pressure": np.tile([0.0, 0.1], n), "level": np.zeros(2 * n, int), "size": np.ones(2 * n)}
     values |= {"strains": REST + np.outer(np.tile([0.0, 0.1], n), [1, 0, 0, 0, 1, 0]), "matrices": np.tile(np.eye(6), (2 * n, 1, 1))}
+    values |= {"strain_slopes": np.full((2 * n, 9, 6), np.nan), "matrix_slopes": np.full((2 * n, 9, 6, 6), np.nan)}
+    values |= {"directions": np.zeros((9, 13))}
     free = States(ONE_SIDED, *(({"design": np.repeat(designs, 2)} | values)[f.name] for f in fields(States)[1:]))
     around = free.of(np.repeat(np.flatnonzero(free.pressure > 0), 2))
     change = np.where(np.arange(2 * n)[:, None] % 2, 0.3 * np.eye(6)[5], around.strains - REST)

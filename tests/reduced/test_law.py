@@ -9,12 +9,13 @@ from base.dataset import UPPER, CellData, columns, write_dataset
 from base.errors import InputError
 from base.materials import NeoHookean, Yeoh
 from geometry.parameters import KINDS, ONE_SIDED, TWISTING
-from geometry.shape_numbers import SHAPE, segment_of, shape_numbers
+from geometry.shape_numbers import SHAPE, direction_matrix, segment_of, shape_numbers
 from reduced.law import RodLaw, read_law
 from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
 from reduced.training import run_training, samples_of
 
+SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
 
 
@@ -68,12 +69,14 @@ def made_up_data():
                 force = D1[0] * M[0].T @ (v + 4 * 0.7 * (v @ v) * v)  # 0.7 |v|^4: a sum of allowed monomials
                 add_state(rows, row, P, free + change, force, K, True)
     about = {"kinds": list(KINDS), "meshes": [{"name": "a", "mesh_size_mm": 1}], "shape": list(SHAPE), "statuses": ["done"]}
+    about["directions"] = {kind: direction_matrix(kind).tolist() for kind in KINDS}
     about |= {"largest_symmetry_defect": 0.01, "revisions": ["made up"], "reasons": {}}
     return CellData(about, **{f.name: np.array(rows[f.name], f.metadata["type"]) for f in columns()})
 
 
 def add_state(rows, row, P, strains, forces, K, prescribed):
     state = {"case": row, "prescribed": prescribed, "pressure": P, "strains": strains, "forces": forces, "stiffness": K[UPPER]}
+    state |= {name: np.full(SLOPES[name], np.nan) for name in SLOPES}
     for f in columns():
         if f.metadata["of"] == "states":
             rows[f.name].append(state.get(f.name, 0))

@@ -1,0 +1,61 @@
+"""Derivatives of free states by the shape, against states of cells whose mesh was moved and solved again."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from base.materials import NeoHookean
+from geometry.cell import mesh_cell
+from geometry.morph import moved
+from geometry.shape_numbers import DIRECTIONS, changed
+from hifi.cell import CellProblem
+from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
+from hifi.control import LoadControl
+from hifi.newton import NewtonOptions
+from hifi.path import EquilibriumPath
+from hifi.shape_slopes import ShapeSlopes
+from hifi.stepping import StepSize, run_steps
+from hifi.wall_contact import WallPenalty
+from tests.cases import CASES
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
+
+STEPS = {"angle": 0.2, "wall": 2e-3}
+
+
+def solved(problem, pressure):
+    system = CellSystem(problem)
+    path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    run_steps(path, pressure, StepSize(first=pressure / 4, smallest=pressure / 64))
+    return system, system.measure()
+
+
+def numbers(state):
+    return np.concatenate([state.strains.e, state.strains.k]), state.stiffness
+
+
+@pytest.mark.parametrize("name, pressure", [("one_sided_w10", 0.02), ("twist_w12", 0.02)])
+def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_path):
+    segment = CASES[name](angle=60.0, chambers=1, material=NeoHookean(0.2))
+    mesh_cell(segment, 6.0, tmp_path / "cell.msh")
+    problem = CellProblem(segment, tmp_path / "cell.msh", contact=WallPenalty())
+    home = problem.mesh.geometry.x.copy()
+    system, state = solved(problem, pressure)
+    strains, stiffness = ShapeSlopes(problem).of(system)
+    # all is where it was: measured again, nothing has changed
+    assert (problem.mesh.geometry.x == home).all() and problem.segment == segment
+    system.factorise()
+    assert numbers(system.measure())[1] == pytest.approx(state.stiffness, rel=1e-9, abs=1e-9 * np.abs(state.stiffness).max())
+    system.destroy()
+    for direction, step in STEPS.items():
+        ends = []
+        for sign in (1, -1):
+            other = changed(segment, DIRECTIONS[segment.kind][direction], sign * step)
+            problem.move(other, moved(home, segment, other))
+            there, found = solved(problem, pressure)
+            ends.append(numbers(found))
+            there.destroy()
+        row = list(DIRECTIONS[segment.kind]).index(direction)
+        for slope, plus, minus in zip((strains[row], stiffness[row]), *ends):
+            difference = (plus - minus) / (2 * step)
+            assert slope == pytest.approx(difference, rel=0.02, abs=0.02 * np.abs(difference).max())
