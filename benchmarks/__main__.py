@@ -28,7 +28,7 @@ PARTS = {
     "segments": (segments.against_segments, "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes"),
     "rod": (rod.speed, "what free and loaded shapes of a rod of four segments cost; some seconds"),
     "rod-fe": (rod.against_finite_elements, "rods with unit cells' laws against finite elements of three bodies; some 5 minutes"),
-    "law": (law.law, "the trained law that comes along: errors on designs it has not seen, the laws compared, cost; some 3 minutes"),
+    "law": (law.law, "the trained law that comes along: errors on designs it has not seen, the laws compared, cost; some seconds"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by third medium; 15 minutes"),
     "paper": (paper.paper, "the paper's twisting and helical models beside unit cells, as they are and calibrated; some 10 minutes"),

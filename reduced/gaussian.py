@@ -22,6 +22,8 @@ TREND = 100.0
 LOG_NOISES = tuple((np.log(1e-6), np.log(most)) for most in (1e-4, 1e-5, 1.0))
 LOG_SCALE = (np.log(0.3), np.log(100.0))
 JITTER = 1e-9
+#: of an output, which may be constant
+LEAST_VARIANCE = 1e-20
 #: evaluated at once: what fits into a core's cache
 ROWS = 256
 #: where the likelihood starts from: scales; noise of observations, of groups, of slopes. It has several maxima: the best one counts
@@ -316,7 +318,7 @@ def _misfit(log, points, data, same):
         inverse, _ = lapack.dpotri(factor, lower=True, overwrite_c=True)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         weights = inverse @ y
-        variance = (y * weights).sum(axis=0) / (n + r)
+        variance = np.maximum((y * weights).sum(axis=0) / (n + r), LEAST_VARIANCE)
         value += (n + r) / 2 * np.log(variance).sum()
         outer = p / 2 * inverse - (weights / variance) @ weights.T / 2
         outer_sum += outer

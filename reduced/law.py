@@ -30,12 +30,13 @@ LOWEST = 1e-9
 
 @dataclass(frozen=True)
 class KindLaw:
-    """The law of one kind. strains, stiffness: processes of Coordinates; quantile (6,): what a standard deviation of each
+    """The law of one kind. strains, touch, stiffness: processes of Coordinates; quantile (6,): what a standard deviation of each
     strain is multiplied by for a 90 % interval; low, high (d,): range of the inputs; doubt: largest deviation of the leading
     strain that counts as known; level: the mesh that is predicted, by its place among those trained on, the finest last."""
 
     kind: str
     strains: SideBySide
+    touch: SideBySide
     stiffness: SideBySide
     anharmonic: Anharmonic
     quantile: np.ndarray
@@ -71,11 +72,15 @@ class KindLaw:
     def stiffness_at(self, shape, strains):
         """(n, 6, 6) the same, of free states with these strains (n, 6)."""
         co = self.coordinates
-        return co.stiffness(shape, self.stiffness(co.stiffness_inputs(shape, strains, self.level)))
+        return co.stiffness(shape, self.stiffness(co.stiffness_inputs(shape, strains, self.touching(shape), self.level)))
+
+    def touching(self, shape):
+        """(n,) logarithm of the leading strain at which walls touch."""
+        return self.touch(self.coordinates.shape_inputs(shape))[:, 0]
 
     def anharmonic_at(self, shape, strains):
         """What reduced.potential's anharmonic forms are made of around free states with these strains (n, 6)."""
-        return self.anharmonic.at(self.coordinates.around_inputs(shape, strains), cosine(shape))
+        return self.anharmonic.at(self.coordinates.around_inputs(shape, strains, self.touching(shape)), cosine(shape))
 
     def half_width(self, shape, pressure):
         """(n, 6) half of the 90 % interval of each free strain."""
@@ -250,6 +255,7 @@ def _ties(segment):
 
 #: fields of the Gaussian processes side by side that are the same in all of them
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
+PROCESSES = ("strains", "touch", "stiffness")
 ANHARMONIC = ("coefficients", "centre", "width", "reach")
 NUMBERS = {"noise": float, "common_noise": float, "slope_noise": float}
 
@@ -258,7 +264,7 @@ def write_law(path, law):
     """Write a RodLaw (.npz)."""
     arrays = {}
     for kind, k in law.kinds.items():
-        for name in ("strains", "stiffness"):
+        for name in PROCESSES:
             for number, process in enumerate(getattr(k, name).processes):
                 for f in fields(GaussianProcess):
                     arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name))
@@ -280,7 +286,7 @@ def read_law(path, name=None):
 
 def _read_kind(stored, kind):
     processes = {}
-    for name in ("strains", "stiffness"):
+    for name in PROCESSES:
         processes[name], number = [], 0
         while f"{kind}/{name}/{number}/noise" in stored:
             values = {f.name: stored[_key(kind, name, number, f.name)] for f in fields(GaussianProcess)}

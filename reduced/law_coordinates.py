@@ -38,6 +38,8 @@ LENGTHS = {
 }
 #: of a normal pitch; lengths that are smaller, or negative, count as this
 SMALLEST = 1e-3
+#: of a strain, whose logarithm is taken; and part of the strain at which walls touch over which they come to do so
+TINY, TOUCH_WIDTH = 1e-6, 0.05
 #: kind -> (index of the leading strain, of the others that are not zero)
 LEADING = {ONE_SIDED: (4, (0, 1, 3)), TWISTING: (0, (3,))}
 #: kind -> blocks of the stiffness
@@ -57,17 +59,28 @@ class Coordinates:
         np.log(self._lengths(shape), out=x[:, 1:-2])
         return x
 
-    def stiffness_inputs(self, shape, strains, level):
-        """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place of the pressure. (What
-        softens a cell is how far it has gone; measured: a fifth off the error.)"""
-        x = self.inputs(shape, np.zeros(len(shape)), level)
-        lead = LEADING[self.kind][0]
-        x[:, -2] = strains[:, lead] - REST[lead]
-        return x
+    def shape_inputs(self, shape):
+        """(n, d - 2) those of `inputs` that the shape alone gives."""
+        return self.inputs(shape, np.zeros(len(shape)), 0)[:, :-2]
 
-    def around_inputs(self, shape, strains):
-        """(n, d - 1) what the enthalpy around free states depends on: the same, whatever the mesh."""
-        return self.stiffness_inputs(shape, strains, 0)[:, :-1]
+    def leading(self, strains):
+        """(n,) the leading one of the strains (n, 6), 0 at rest."""
+        lead = LEADING[self.kind][0]
+        return strains[:, lead] - REST[lead]
+
+    def stiffness_inputs(self, shape, strains, touch, level):
+        """(n, d + 1) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place of the pressure, and
+        how much walls touch, from 0 to 1, when they do so from the leading strain exp(touch) (n,) on. (What softens a cell is how far
+        it has gone; measured: a fifth off the error. Where walls meet, the stiffness jumps; measured: half off the error in twisting
+        segments.)"""
+        x, lead = self.inputs(shape, np.zeros(len(shape)), level), self.leading(strains)
+        x[:, -2] = lead
+        beyond = (np.log(np.maximum(lead, TINY)) - touch) / TOUCH_WIDTH
+        return np.insert(x, -1, 1 / (1 + np.exp(-np.clip(beyond, -30, 30))), axis=1)
+
+    def around_inputs(self, shape, strains, touch):
+        """(n, d) what the enthalpy around free states depends on: the same, whatever the mesh."""
+        return self.stiffness_inputs(shape, strains, touch, 0)[:, :-1]
 
     @cached_property
     def _sums(self):

@@ -11,12 +11,15 @@ from reduced.law_coordinates import REST, Coordinates
 ENOUGH = 100
 #: parts that the training designs fall into for that
 PARTS = 10
+#: leading strain at which walls may touch at the soonest, and how many times as far as it went a case's walls are thought to close
+SOONEST, FURTHEST = 1e-3, 4.0
 
 
 @dataclass(frozen=True)
 class States:
     """Free states of one kind, rest included: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers,
-    level (n,) of the mesh, the finest last, and size (n,): norm of the free strains, rest taken off, at the case's top pressure.
+    level (n,) of the mesh, the finest last, size (n,): norm of the free strains, rest taken off, at the case's top pressure, and
+    touch (n,): logarithm of the leading strain at which the case's walls touch, extrapolated where they do not.
     strain_slopes (n, s, 6), matrix_slopes (n, s, 6, 6): derivatives along the `directions` (s, 13) of shape, nan where not known."""
 
     kind: str
@@ -27,6 +30,7 @@ class States:
     design: np.ndarray
     level: np.ndarray
     size: np.ndarray
+    touch: np.ndarray
     strain_slopes: np.ndarray
     matrix_slopes: np.ndarray
     directions: np.ndarray
@@ -92,6 +96,7 @@ def sample_of(data, kind, held_out):
     top = {}
     for i in free:  # pressures increase
         top[data.case[i]] = np.linalg.norm(data.strains[i] - REST)
+    touch = {case: _touching_strain(data, free[data.case[free] == case], Coordinates(kind)) for case in top}
     at = {(data.case[i], round(float(data.pressure[i]), 6)): n for n, i in enumerate(free)}
     states = States(
         kind,
@@ -99,6 +104,7 @@ def sample_of(data, kind, held_out):
         data.design[data.case[free]],
         level[data.mesh[data.case[free]]],
         np.array([top[data.case[i]] for i in free]),
+        np.array([touch[data.case[i]] for i in free]),
         data.strain_slopes[free, : len(directions)].astype(float),
         full_matrices(data.stiffness_slopes[free, : len(directions)].astype(float)),
         directions,
@@ -107,6 +113,18 @@ def sample_of(data, kind, held_out):
     where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)
     change = data.strains[held].astype(float) - states.strains[where]
     return Sample(states, states.of(where), change, data.forces[held].astype(float))
+
+
+def _touching_strain(data, rows, coordinates):
+    """Logarithm of the leading strain at which walls touch in a case whose free states have these rows, at rest first."""
+    lead, distance = coordinates.leading(data.strains[rows].astype(float)), data.wall_distance[rows].astype(float)
+    first = float(data.first_touch[data.case[rows[0]]])
+    if np.isfinite(first):
+        return np.log(max(np.interp(first, data.pressure[rows], lead), SOONEST))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        further = distance[-1] * (lead[-1] - lead[-2]) / (distance[-2] - distance[-1])
+    furthest = FURTHEST * lead[-1]
+    return np.log(max(lead[-1] + (min(further, furthest) if further > 0 else furthest), SOONEST))
 
 
 def folds(designs, parts):

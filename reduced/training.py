@@ -41,8 +41,8 @@ DOUBT = 2.0
 #: step of central differences along directions of shape (degrees, normal pitches): the transformations are smooth there
 STEP = 1e-4
 
-#: of the leading strain's logarithm over a standard deviation of the inputs: above that a state is next to its limit load, where
-#: derivatives grow without bound
+#: of what is learned (of the strains: the leading one's logarithm) over a standard deviation of the inputs: above that a state is next
+#: to its limit load or walls are just touching, where derivatives grow without bound
 STEEPEST = 1.0
 #: of the angle, below which derivatives along it are not used
 SMALLEST_COSINE = 0.2
@@ -60,6 +60,11 @@ def slopes_of(states, known, inputs, outputs, some):
     ends = [[a + sign * STEP * b for a, b in zip((s.shape, s.strains, s.matrices), change)] for sign in (1, -1)]
     ways, values = ((f(*ends[0], s) - f(*ends[1], s)) / (2 * STEP) for f in (inputs, outputs))
     return gaussian.Slopes((np.cumsum(some) - 1)[at], ways, values)
+
+
+def in_deviations(slopes, inputs):
+    """(r, p) Slopes over a standard deviation of the inputs (n, d)."""
+    return slopes.in_units(np.maximum(inputs.std(axis=0), 1e-12)).values
 
 
 def told_by_angle(states):
@@ -83,17 +88,24 @@ def fit_strains(states, like=None, again=False, slopes=True):
     if slopes:
         known = np.isfinite(states.strain_slopes).all(axis=2) & told_by_angle(states)
         steep = slopes_of(states, known, lambda shape, strains, matrices, s: co.inputs(shape, s.pressure, s.level), outputs, good)
-        size = np.linalg.norm(steep.ways / np.maximum(states.inputs.std(axis=0), 1e-12), axis=1)
-        steep = steep.of(np.abs(steep.values[:, 0]) < STEEPEST * size)
+        steep = steep.of(np.abs(in_deviations(steep, states.inputs)[:, 0]) < STEEPEST)
     return gaussian.fit_side_by_side(states.inputs[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), steep, like, again)
 
 
-def fit_stiffness(states, like=None, again=False):
-    """Gaussian process of the learned stiffness."""
+def fit_touch(states, like=None, again=False):
+    """Gaussian process of `States.touch`."""
+    _, each = np.unique(states.case, return_index=True)
+    one = states.of(each)
+    x, y = Coordinates(states.kind).shape_inputs(one.shape), one.touch[:, None]
+    return gaussian.fit_side_by_side(x, y, one.case, np.ones(y.shape), (1,), None, like, again)
+
+
+def fit_stiffness(states, touch, like=None, again=False):
+    """Gaussian process of the learned stiffness; touch: of `fit_touch`."""
     co = Coordinates(states.kind)
 
     def inputs(shape, strains, matrices, s):
-        return co.stiffness_inputs(shape, strains, s.level)
+        return co.stiffness_inputs(shape, strains, touch(co.shape_inputs(shape))[:, 0], s.level)
 
     def outputs(shape, strains, matrices, s):
         return co.learned_stiffness(shape, matrices)
@@ -102,8 +114,8 @@ def fit_stiffness(states, like=None, again=False):
     good = np.isfinite(y).all(axis=1)
     trust = odd(co.stiffness_parity, np.abs(cosine(states.shape)))
     known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states)
-    steep = slopes_of(states, known, inputs, outputs, good)
-    x = inputs(states.shape, states.strains, None, states)
+    x, steep = inputs(states.shape, states.strains, None, states), slopes_of(states, known, inputs, outputs, good)
+    steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
     return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (y.shape[1],), steep, like, again)
 
 
@@ -111,15 +123,17 @@ def fit_kind(sample, like=None):
     """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts."""
     states, around = sample.free, sample.around
     strains = fit_strains(states, like and like.strains, again=True)
-    stiffness = fit_stiffness(states, like and like.stiffness, again=True)
-    x = Coordinates(states.kind).around_inputs(around.shape, around.strains)
+    touch = fit_touch(states, like and like.touch, again=True)
+    stiffness = fit_stiffness(states, touch, like and like.stiffness, again=True)
+    co = Coordinates(states.kind)
+    x = co.around_inputs(around.shape, around.strains, touch(co.shape_inputs(around.shape))[:, 0])
     anharmonic = fit_anharmonic(states.kind, x, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces)
     x = states.inputs
     doubt = DOUBT * float(strains.deviation(x)[:, 0].max())
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
     low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
     low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
-    law = KindLaw(states.kind, strains, stiffness, anharmonic, np.ones(6), low, high, doubt, int(states.level.max()))
+    law = KindLaw(states.kind, strains, touch, stiffness, anharmonic, np.ones(6), low, high, doubt, int(states.level.max()))
     return replace(law, quantile=_quantiles(law, states.loaded))
 
 
@@ -241,16 +255,18 @@ def run_training(path, out, say=print, compare=True, mapping=map):
     jobs = [(fit_kind, (training,)) for training, _ in samples.values()]
     if compare:
         jobs += [(job, pair) for pair in samples.values() for job in (compare_laws, learning_curve)]
-    done = list(mapping(_do, jobs))
+    done = list(_shown(mapping(_do, jobs), len(jobs), "trained", say))
     laws, tables = dict(zip(samples, done)), iter(done[len(samples) :])
-    judged = judge(laws, samples, mapping)
-    lines = [f"# The trained law of {Path(path).name}"]
+    judged = judge(laws, samples, mapping, say)
+    lines, held_out, compared = [f"# The trained law of {Path(path).name}"], held_out_figures(laws, samples), {}
     for kind, pair in samples.items():
         lines += ["", f"## {kind}", "", judged_on(*pair), "", "| figure | value |", "|---|---|"]
         lines += [f"| {name} | {value:.4f} |" for name, value in judged[kind].items()]
-        lines += [*law_table(next(tables)), *curve_table(next(tables))] if compare else []
-    about = {"data": Path(path).name, "data_sha256": digest(path), "figures": judged, "revisions": data.about["revisions"]}
-    law = RodLaw(laws, about)
+        if compare:
+            compared[kind] = {"laws": next(tables), "learning curve": next(tables)}
+            lines += [*law_table(compared[kind]["laws"]), *curve_table(compared[kind]["learning curve"])]
+    about = {"data": Path(path).name, "data_sha256": digest(path), "revisions": data.about["revisions"]}
+    law = RodLaw(laws, about | {"figures": judged, "held_out": held_out, "compared": compared})
     write_law(out, law)
     write_text(Path(out).with_suffix(".md"), "\n".join(lines) + "\n")
     for line in lines:
@@ -264,13 +280,25 @@ def _do(job):
     return function(*arguments)
 
 
-def judge(laws, samples, mapping=map):
+def held_out_figures(laws, samples):
+    """{kind: {figure: number}} of KindLaws on the held-out designs alone."""
+    return {kind: figures([misses(law, samples[kind][1])]) for kind, law in laws.items()}
+
+
+def _shown(results, count, what, say):
+    """The results as they come, each told."""
+    for number, result in enumerate(results, start=1):
+        say(f"{number}/{count} {what}")
+        yield result
+
+
+def judge(laws, samples, mapping=map, say=lambda text: None):
     """{kind: {figure: number}} of KindLaws on the designs that neither they nor, where those are few, laws of parts have seen."""
     jobs = []
     for kind, law in laws.items():
         (_, held_out), *parts = splits(*samples[kind])
         jobs += [(misses, (law, held_out)), *[(judge_again, (law, *part)) for part in parts]]
-    done = iter(mapping(_do, jobs))
+    done = iter(list(_shown(mapping(_do, jobs), len(jobs), "judged", say)))
     out = {}
     for kind, law in laws.items():
         found = [next(done) for _ in splits(*samples[kind])]

@@ -9,7 +9,9 @@ from geometry.parameters import ONE_SIDED, TWISTING
 from geometry.shape_numbers import SHAPE, shape_numbers
 from hifi.campaign_case import first_touch, prescribed_change
 from hifi.campaign_sample import RANGES, prescribed_states, segments
+from hifi.campaign_extension import taken_over
 from hifi.campaignfile import read_campaign
+from reduced.choice import DATA_SET
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="nothing parallel in it")
 
@@ -92,6 +94,16 @@ def test_first_touch_lies_where_the_wall_distance_would_pass_zero_and_before_wal
     assert first_touch([*open_ones, free(0.12, 0.001, 0.3)]) == pytest.approx(0.12)
     assert first_touch([free(0.0, 0.5), free(0.1, 0.001, 0.3)]) == 0.1
     assert first_touch(open_ones) is None and first_touch([]) is None
+
+
+def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
+    """(That one of the same sample can is in tests/pneunet/test_campaign.py.)"""
+    like = "seed = 1\n[[mesh]]\nname = 'coarse'\nmesh_size_mm = "
+    assert len(taken_over(campaign(tmp_path, like + "2.0"), DATA_SET).cases) > 200
+    with pytest.raises(InputError, match="its mesh is .*extend it with the same"):
+        taken_over(campaign(tmp_path, like + "3.0"), DATA_SET)
+    with pytest.raises(InputError, match="seed = 1, the campaign's 2: extend it with the same"):
+        taken_over(campaign(tmp_path, "seed = 2"), DATA_SET)
 
 
 @pytest.mark.parametrize(
