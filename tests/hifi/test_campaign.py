@@ -8,8 +8,8 @@ from base.errors import InputError
 from geometry.parameters import ONE_SIDED, TWISTING
 from geometry.shape_numbers import SHAPE, shape_numbers
 from hifi.campaign_case import first_touch, prescribed_change
-from hifi.campaign_sample import RANGES, prescribed_states, segments
 from hifi.campaign_extension import taken_over
+from hifi.campaign_sample import RANGES, prescribed_states, segments
 from hifi.campaignfile import read_campaign
 from reduced.choice import DATA_SET
 
