@@ -35,9 +35,9 @@ INTERVAL = 0.9
 CURVE = (0.25, 0.5, 1.0)
 #: the training designs' ranges are widened by this part before a design is outside
 MARGIN = 0.02
-#: a deviation above this many times the largest one at the training points is outside
-DOUBT = 2.0
 
+#: a deviation above this many times the largest one at the training points, rest included, is outside
+DOUBT = 2.0
 #: step of central differences along directions of shape (degrees, normal pitches): the transformations are smooth there
 STEP = 1e-4
 
@@ -231,7 +231,10 @@ def samples_of(data, say=lambda text: None):
             say(f"{text}: too few, or no prescribed states: the law will not know this kind")
             continue
         say(text)
-        out[kind] = pair
+        common = training.on_common_meshes()
+        if common.free.level.max() < training.free.level.max():
+            say(f"{kind}: too few designs on the finest mesh: the law is one of the coarser mesh")
+        out[kind] = common, held_out
     if not out:
         raise InputError(f"too few accepted designs of any kind to train on ({text})")
     return out

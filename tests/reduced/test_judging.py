@@ -1,6 +1,6 @@
 """Which designs a law is judged on: those it has not seen, each once."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import pytest
 from geometry.parameters import ONE_SIDED
 from reduced.judging import stiffness_error, strain_error, tip_error
 from reduced.law_coordinates import REST
-from reduced.states import ENOUGH, PARTS, Sample, States, splits
+from reduced.states import COMMON, ENOUGH, PARTS, Sample, States, splits
 
 
 def sample(designs):
@@ -35,6 +35,15 @@ def test_few_held_out_designs_are_joined_by_every_training_design_once():
         assert not set(learned.designs) & set(there.designs) and len(learned.designs) + len(there.designs) == 37
         assert set(there.around.design) == set(there.designs)
     assert len(splits(training, sample(np.arange(100, 100 + ENOUGH)))) == 1
+
+
+def test_a_mesh_of_few_designs_is_left_out():
+    many = sample(np.arange(2 * COMMON))
+    for fine, levels in ((COMMON - 1, {0}), (COMMON, {0, 1})):
+        states = [replace(s, level=(s.design < fine).astype(int)) for s in (many.free, many.around)]
+        two = replace(many, free=states[0], around=states[1])
+        kept = two.on_common_meshes()
+        assert set(kept.free.level) == levels == set(kept.around.level) and len(kept.change) == len(kept.around.level)
 
 
 def test_prescribed_states_are_told_apart():
