@@ -82,7 +82,8 @@ def page(text, details):
     lines = ["## How well it does"]
     for kind, found in details.items():
         lines += ["", f"### {kind}", "", found["judged on"], ""]
-        rows = [(f"`{name}`", f"{value:.4g}", f"{found['held out'].get(name, np.nan):.4g}") for name, value in found["figures"].items()]
+        alone = {name: f"{value:.4g}" for name, value in found["held out"].items()}
+        rows = [(f"`{name}`", f"{value:.4g}", alone.get(name, "")) for name, value in found["figures"].items()]
         lines += table(["figure", "value", "held-out designs alone"], rows)
         rows = [(name, f"{median:.2%}", f"{high:.2%}", f"{without:.1%}") for name, median, high, without in found["laws"]]
         lines += ["", *table(["law of the free strains", "median error", "95th percentile", "without an answer"], rows)]
