@@ -21,7 +21,8 @@ def train(ranks, folder, name):
 def test_the_same_law_on_any_number_of_ranks(tmp_path):
     write_dataset(tmp_path / "cells.npz", made_up_data())
     text = train(1, tmp_path, "one.npz")
-    for row in ("calibrated analytic model", "regressor", "analytic model and regressor", "law_interval_coverage_90"):
+    rows = ["calibrated analytic model", "analytic model and regressor of the states", "law_interval_coverage_90"]
+    for row in (*rows, "regressor of the states", "regressor of the states and their derivatives by the shape"):
         assert f"| {row} |" in text
     train(3, tmp_path, "three.npz")
     for suffix in (".npz", ".md"):
