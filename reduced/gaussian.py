@@ -30,8 +30,8 @@ ROWS = 256
 STARTS = ((3.0, 1e-5, 1e-5, 1e-3), (6.0, 1e-4, 1e-6, 1e-2))
 #: inducing points lie at observations and this far from them, in standard deviations of the inputs, along the ways of their slopes
 AWAY = 0.5
-#: further directions of the metric beside the inputs themselves, where slopes tell them. (Measured: a fifth off the error with slopes;
-#: from values alone they fit the chance of the sample, and the error of designs not seen grows by a half.)
+#: further directions of the metric beside the inputs themselves, where slopes tell them. (Measured: up to a fifth off the error with
+#: slopes; from values alone they fit the chance of the sample, and the error of designs not seen grows by up to a quarter.)
 EXTRA = 2
 #: steps towards the largest likelihood, from a start and from what another process has found
 MOST_STEPS, MORE_STEPS = 100, 30

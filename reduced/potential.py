@@ -3,7 +3,7 @@
 With K = L D L^T the stiffness of the free state (D's first entry D1 belongs to e1) and d = q - q_free,
     psi = D1 (|v|^2 / 2 + sum over monomials m of c_m(c) v^m),   v = sqrt(D/D1) L^T d.
 In v the anharmonic part of very different cells is nearly the same; its coefficients are linear in what the stiffness is learned from
-(measured: a quarter off the error of forces in one-sided segments). Monomials that the half turns of the body forbid are left
+(measured: a third off the error of forces in one-sided segments). Monomials that the half turns of the body forbid are left
 out; those that are odd in the mirror image carry c = cos(angle). Without dimension throughout.
 """
 
