@@ -255,6 +255,8 @@ def _ties(segment):
 
 #: fields of the Gaussian processes side by side that are the same in all of them
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
+#: what only deviations need, kept in single precision: most of the file
+SINGLE = {"observed": "f4", "ways": "f4", "trust": "f4", "group": "i4", "at": "i4"}
 PROCESSES = ("strains", "touch", "stiffness")
 ANHARMONIC = ("coefficients", "centre", "width", "reach")
 NUMBERS = {"noise": float, "common_noise": float, "slope_noise": float}
@@ -267,7 +269,7 @@ def write_law(path, law):
         for name in PROCESSES:
             for number, process in enumerate(getattr(k, name).processes):
                 for f in fields(GaussianProcess):
-                    arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name))
+                    arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name), SINGLE.get(f.name))
         arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
         arrays |= {f"{kind}/anharmonic/{name}": np.asarray(getattr(k.anharmonic, name)) for name in ANHARMONIC}
     about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": {k: list(v) for k, v in LENGTHS.items()}, **law.about}

@@ -5,7 +5,7 @@ import pytest
 
 from base.materials import NeoHookean
 from geometry.morph import moved
-from geometry.parameters import ONE_SIDED, TWISTING
+from geometry.parameters import ONE_SIDED
 from geometry.shape_numbers import DIRECTIONS, changed, direction_matrix, normal_pitch, shape_numbers
 from tests.cases import CASES
 
@@ -55,7 +55,3 @@ def test_directions_keep_the_normal_pitch_and_are_what_the_matrix_says(segment):
         other = changed(segment, change, 0.01)
         assert normal_pitch(other) == pytest.approx(normal_pitch(segment))
         assert shape_numbers(other) - shape_numbers(segment) == pytest.approx(0.01 * row, abs=1e-12)
-
-
-def test_twisting_cells_have_a_direction_more():
-    assert len(DIRECTIONS[TWISTING]) == len(DIRECTIONS[ONE_SIDED]) + 1
