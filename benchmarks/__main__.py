@@ -12,7 +12,7 @@ from pathlib import Path
 
 from base.files import write_text
 from base.record import machine, revision
-from benchmarks import cell, chain, contact, contact_page, law, paper, paper_page, rod, segments, speed, verification
+from benchmarks import cell, chain, contact, contact_page, law, paper, paper_page, rod, segments, silicones, speed, verification
 from benchmarks.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -27,8 +27,9 @@ PARTS = {
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "segments": (segments.against_segments, "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes"),
     "rod": (rod.speed, "what free and loaded shapes of a rod of four segments cost; some seconds"),
-    "rod-fe": (rod.against_finite_elements, "rods with unit cells' laws against finite elements of three bodies; some 5 minutes"),
+    "rod-fe": (rod.against_finite_elements, "rods with unit cells' laws against finite elements of three bodies; some 20 minutes"),
     "law": (law.law, "the trained law that comes along: errors on designs it has not seen, the laws compared, cost; some seconds"),
+    "silicones": (silicones.silicones, "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes"),
     "verification": (verification.verification, "exact solutions, Land, Cook, manufactured solution, patches, energy; some 3 minutes"),
     "contact": (contact.contact, "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by third medium; 15 minutes"),
     "paper": (paper.paper, "the paper's twisting and helical models beside unit cells, as they are and calibrated; some 10 minutes"),
@@ -59,11 +60,13 @@ MEANING = {
     "rod_free_shape_us": "free shape of four segments (12 pieces) at some 200 points, strains given: best us a call",
     "rod_free_batch_us": "the same for 1000 designs at once (205 points each): us a design",
     "rod_gravity_ms": "that rod hanging under its weight, to 0.05 % of its length: best ms a call",
-    "rod_vs_fe_tip_rel_max": "rods with the unit cells' quadratic laws against FE, h = 1.5 mm, three bodies of 5 chambers, free at 20 and "
+    "rod_vs_fe_tip_rel_max": "rods with the unit cells' quadratic laws against FE, h = 1 mm, three bodies of 5 chambers, free at 20 and "
     "50 kPa, hanging and pushed at 20: largest distance of the tips over the length",
     "rod_vs_fe_rms_rel_max": "the same: largest RMS distance of the centrelines over the length",
     "rod_vs_fe_tip_rel_max_without_ends": "the tips' distance with the end effects switched off",
     "rod_vs_fe_rms_rel_max_without_ends": "the centrelines' distance with the end effects switched off",
+    "rod_vs_fe_tip_rel_max_trained": "the tips' distance with the trained law that comes along, whatever mesh that is for",
+    "rod_vs_fe_rms_rel_max_trained": "the centrelines' distance with the trained law",
     "dataset_one_sided": "data set of cells: accepted one-sided designs",
     "dataset_twisting": "data set of cells: accepted twisting designs",
     "dataset_accepted_fraction": "data set of cells: cases accepted over cases computed",
@@ -75,6 +78,9 @@ MEANING = {
     "law_interval_coverage_90": "the same designs: share of free strains within their 90 % intervals, of the kind that is further from 0.9",
     "law_batch_10k_seconds": "free strains and their slopes of 10,000 (design, pressure), the dearer kind: best CPU s",
     "law_single_us": "free strains of one segment at one pressure, the dearer kind: best CPU us",
+    "law_real_silicone_strain_rel_01": "cells of fitted silicones (Yeoh) against neo-Hookean ones of the same initial modulus: largest "
+    "difference of the free strains at P/mu = 0.1 over their norm",
+    "law_real_silicone_strain_rel_02": "the same at P/mu = 0.2",
     "law_load_ms": "reading the law's file: best CPU ms",
     "rod_free_shape_with_law_us": "free shape of four segments at some 200 points, the law's strains included: best CPU us",
     "sphere_max_rel_error": "inflated sphere: largest relative error of the inner radius at P/mu = 0.1 .. 0.8",
@@ -173,7 +179,7 @@ def snapshot():
     write_text(ROOT / "docs" / "speed.md", speed.page(results, meta))
     if "law" in meta:
         page = ROOT / "docs" / "rod-law.md"
-        write_text(page, law.page(page.read_text(), meta["law"]["details"]))
+        write_text(page, law.page(page.read_text(), meta["law"]["details"], meta.get("silicones")))
     if "contact" in meta:
         page = ROOT / "docs" / "contact.md"
         write_text(page, contact_page.page(page.read_text(), results, meta["contact"]["details"]))

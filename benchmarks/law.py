@@ -4,6 +4,7 @@ held-out designs computed again from data set and law; and what it costs.
 
 import numpy as np
 
+from benchmarks import silicones
 from benchmarks.rod import best_seconds
 from benchmarks.tables import below_mark, table
 
@@ -77,9 +78,11 @@ def costs(shipped):
     }
 
 
-def page(text, details):
-    """docs/rod-law.md, of which `text` is the present one, with the part below its mark made anew."""
-    lines = ["## How well it does"]
+def page(text, details, materials):
+    """docs/rod-law.md, of which `text` is the present one, with the part below its mark made anew; materials: what the part `silicones`
+    has found, or None."""
+    lines = silicones.lines(materials["details"]) if materials else []
+    lines.append("## How well it does")
     for kind, found in details.items():
         lines += ["", f"### {kind}", "", found["judged on"], ""]
         alone = {name: f"{value:.4g}" for name, value in found["held out"].items()}

@@ -95,6 +95,18 @@ class GaussianProcess:
         return self.inducing @ self.metric
 
     @cached_property
+    def _half(self):
+        return _half_squares(self.points)
+
+    @cached_property
+    def _weighed_points(self):
+        return (self.weights[: len(self.points), :, None] * self.points[:, None, :]).reshape(len(self.points), -1)
+
+    def exponent(self, a):
+        """(n, m) logarithms of the kernels at the inducing points, of inputs a (n, e) in the same space."""
+        return _exponent(a, self.points, self._half)
+
+    @cached_property
     def _root(self):
         """(m + 1 + d, same) triangular factor for the deviation, as if every output were as noisy as the first: found when asked for,
         since it is ten times the size of all the rest."""
@@ -114,14 +126,15 @@ class GaussianProcess:
         z = (x - self.shift) / self.width
         a, m = z @ self.metric, len(self.points)
         smooth, constant, slopes = self.weights[:m], self.weights[m], self.weights[m + 1 :]
-        kernel = _kernel(a, self.points)
+        kernel = self.exponent(a)
+        np.exp(kernel, out=kernel)
         curved = kernel @ smooth
         mean = curved + constant + z @ slopes
         if not derivative:
             return mean
         # d k(a, b)/d a = k (b - a)
         p = smooth.shape[1]
-        first = kernel @ (smooth[:, :, None] * self.points[:, None, :]).reshape(m, -1)
+        first = kernel @ self._weighed_points
         slope = first.reshape(len(x), p, -1) - curved[:, :, None] * a[:, None, :]
         return mean, (slope @ self.metric.T + slopes.T) / self.width
 
@@ -147,25 +160,71 @@ class SideBySide:
             return np.concatenate(found, axis=1)
         return tuple(np.concatenate(part, axis=1) for part in zip(*found))
 
+    def rest(self, x):
+        """All but the first process."""
+        return np.concatenate([process(x) for process in self.processes[1:]], axis=1)
+
     def deviation(self, x):
         return np.concatenate([process.deviation(x) for process in self.processes], axis=1)
 
 
-def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, again=False):
+class AlongInput:
+    """The first output of a GaussianProcess at inputs of which one, that at `place`, changes: what is left to do for each change is an
+    exponential for each inducing point."""
+
+    def __init__(self, process, place):
+        self._process, m = process, len(process.points)
+        way = process.metric[place] / process.width[place]
+        weights, plane = process.weights[:m, 0], process.weights[m:, 0]
+        self._way, self._b, self._square = way, process.points @ way, way @ way
+        self._weights = np.stack([weights, weights * self._b, weights * self._b**2], axis=1)
+        self._constant, self._slopes, self._slope = plane[0], plane[1:], plane[1:][place] / process.width[place]
+
+    def start(self, x):
+        """What `at` asks for, of inputs x (n, d): as many rows may be kept as one likes."""
+        z = (x - self._process.shift) / self._process.width
+        a = z @ self._process.metric
+        return self._process.exponent(a), a @ self._way, self._constant + z @ self._slopes
+
+    def at(self, start, change):
+        """(value, slope, curvature), each (n,), after a change (n,) of the input."""
+        fixed, a, plane = start
+        exponent = np.multiply.outer(change, self._b)
+        exponent += fixed
+        sums = np.exp(exponent, out=exponent) @ self._weights
+        at = a + change * self._square
+        sums *= np.exp(-change * (a + at) / 2)[:, None]
+        value = sums[:, 0] + plane + self._slope * change
+        slope = sums[:, 1] - at * sums[:, 0] + self._slope
+        return value, slope, sums[:, 2] - 2 * at * sums[:, 1] + (at**2 - self._square) * sums[:, 0]
+
+
+def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, again=False, inducing=1500):
     """SideBySide processes of `widths` outputs each; the rest as for `fit`."""
     ends = np.cumsum([0, *widths])
     likes = like.processes if like else [None] * len(widths)
     slopes = slopes or no_slopes(x.shape[1], y.shape[1])
     parts = [slice(*both) for both in zip(ends, ends[1:])]
-    found = [fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, again=again) for c, known in zip(parts, likes)]
+    same = {"inducing": inducing, "again": again}
+    found = [fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, **same) for c, known in zip(parts, likes)]
     return SideBySide(tuple(found))
 
 
-def _kernel(a, b):
+def _half_squares(a):
+    return np.einsum("ij,ij->i", a, a) / 2
+
+
+def _exponent(a, b, half):
+    """(n, m) -|a - b|^2/2 of a (n, e), b (m, e); half: of b."""
     k = a @ b.T
-    k -= (a * a).sum(axis=1)[:, None] / 2
-    k -= (b * b).sum(axis=1) / 2
-    return np.exp(np.minimum(k, 0, out=k), out=k)
+    k -= _half_squares(a)[:, None]
+    k -= half
+    return k
+
+
+def _kernel(a, b):
+    k = _exponent(a, b, _half_squares(b))
+    return np.exp(k, out=k)
 
 
 def fit(x, y, group, trust=None, slopes=None, most=400, inducing=1500, seed=0, like=None, again=False):

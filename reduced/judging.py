@@ -39,10 +39,11 @@ def force_error(law, sample):
     """(m,) norm of the force error over that of the force, whitened by the stiffness; law alone, its free states included."""
     f = sample.around
     free = law.free_strains(f.shape, f.pressure)
-    K = law.stiffness_at(f.shape, free)
+    closed = law.closed(f.shape, f.pressure, free)
+    K = law.stiffness_at(f.shape, free, closed)
     M, D1 = whitening(law.kind, K)
     v = np.einsum("nij,nj->ni", M, f.strains + sample.change - free)
-    by_v = D1[:, None] * (v + anharmonic_gradient(v, law.anharmonic_at(f.shape, free)))
+    by_v = D1[:, None] * (v + anharmonic_gradient(v, law.anharmonic_at(f.shape, free, closed)))
     forces = np.einsum("nij,ni->nj", M, by_v)
     own, _ = whitening(law.kind, symmetric(f.matrices))
     white = [np.linalg.solve(np.swapaxes(own, 1, 2), x[..., None])[..., 0] for x in (forces - sample.forces, sample.forces)]

@@ -13,15 +13,16 @@ ENOUGH = 100
 PARTS = 10
 #: designs on a finer mesh that suffice to learn what it changes (measured: from two of them the law's guess was three times off)
 COMMON = 10
-#: leading strain at which walls may touch at the soonest, and how many times as far as it went a case's walls are thought to close
-SOONEST, FURTHEST = 1e-3, 4.0
+#: of a pressure: nearer to that of a state, first touch is known to lie before it, not where
+NEAR = 1e-4
 
 
 @dataclass(frozen=True)
 class States:
     """Free states of one kind, rest included: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers,
-    level (n,) of the mesh, the finest last, size (n,): norm of the free strains, rest taken off, at the case's top pressure, and
-    touch (n,): logarithm of the leading strain at which the case's walls touch, extrapolated where they do not.
+    level (n,) of the mesh, the finest last, size (n,): norm of the free strains, rest taken off, at the case's top pressure;
+    closing (n,): how far walls have come nearer, as if they could go on in the first state after touch, over the load
+    (Coordinates.closing_load) and the normal pitch; nan in the states beyond and at rest. touching (n,) bool.
     strain_slopes (n, s, 6), matrix_slopes (n, s, 6, 6): derivatives along the `directions` (s, 13) of shape, nan where not known."""
 
     kind: str
@@ -32,7 +33,8 @@ class States:
     design: np.ndarray
     level: np.ndarray
     size: np.ndarray
-    touch: np.ndarray
+    closing: np.ndarray
+    touching: np.ndarray
     strain_slopes: np.ndarray
     matrix_slopes: np.ndarray
     directions: np.ndarray
@@ -105,7 +107,7 @@ def sample_of(data, kind, held_out):
     top = {}
     for i in free:  # pressures increase
         top[data.case[i]] = np.linalg.norm(data.strains[i] - REST)
-    touch = {case: _touching_strain(data, free[data.case[free] == case], Coordinates(kind)) for case in top}
+    closing = {i: rate for case in top for i, rate in _closing(data, free[data.case[free] == case], Coordinates(kind))}
     at = {(data.case[i], round(float(data.pressure[i]), 6)): n for n, i in enumerate(free)}
     states = States(
         kind,
@@ -113,7 +115,8 @@ def sample_of(data, kind, held_out):
         data.design[data.case[free]],
         level[data.mesh[data.case[free]]],
         np.array([top[data.case[i]] for i in free]),
-        np.array([touch[data.case[i]] for i in free]),
+        np.array([closing.get(i, np.nan) for i in free]),
+        data.pressure[free] >= (1 - NEAR) * _met(data.first_touch[data.case[free]]),
         data.strain_slopes[free, : len(directions)].astype(float),
         full_matrices(data.stiffness_slopes[free, : len(directions)].astype(float)),
         directions,
@@ -124,16 +127,24 @@ def sample_of(data, kind, held_out):
     return Sample(states, states.of(where), change, data.forces[held].astype(float))
 
 
-def _touching_strain(data, rows, coordinates):
-    """Logarithm of the leading strain at which walls touch in a case whose free states have these rows, at rest first."""
-    lead, distance = coordinates.leading(data.strains[rows].astype(float)), data.wall_distance[rows].astype(float)
-    first = float(data.first_touch[data.case[rows[0]]])
-    if np.isfinite(first):
-        return np.log(max(np.interp(first, data.pressure[rows], lead), SOONEST))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        further = distance[-1] * (lead[-1] - lead[-2]) / (distance[-2] - distance[-1])
-    furthest = FURTHEST * lead[-1]
-    return np.log(max(lead[-1] + (min(further, furthest) if further > 0 else furthest), SOONEST))
+def _met(first_touch):
+    """Pressures of first touch, infinite where there was none."""
+    return np.where(np.isfinite(first_touch), first_touch.astype(float), np.inf)
+
+
+def _closing(data, rows, coordinates):
+    """Pairs (row, States.closing) of a case's free states, which have these rows, at rest first: those that say something."""
+    distance, pressure = (a[rows].astype(float) for a in (data.wall_distance, data.pressure))
+    load, first = coordinates.closing_load(pressure, data.strains[rows].astype(float)), _met(data.first_touch[data.case[rows[0]]])
+    for n in range(1, len(rows)):
+        if load[n] <= 0:
+            continue
+        if pressure[n] < (1 - NEAR) * first:
+            yield rows[n], (distance[0] - distance[n]) / load[n]
+        else:
+            if pressure[n] > (1 + NEAR) * first > 0:
+                yield rows[n], distance[0] / np.interp(first, pressure, load)
+            return
 
 
 def folds(designs, parts):

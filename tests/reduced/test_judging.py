@@ -15,7 +15,7 @@ def sample(designs):
     """Two states of each design, the second one with strains prescribed around it twofold and in some direction."""
     n = len(designs)
     values = {"shape": np.ones((2 * n, 13)), "pressure": np.tile([0.0, 0.1], n), "level": np.zeros(2 * n, int)}
-    values |= {"size": np.ones(2 * n), "touch": np.zeros(2 * n)}
+    values |= {"size": np.ones(2 * n), "closing": np.full(2 * n, np.nan), "touching": np.zeros(2 * n, bool)}
     values |= {"strains": REST + np.outer(np.tile([0.0, 0.1], n), [1, 0, 0, 0, 1, 0]), "matrices": np.tile(np.eye(6), (2 * n, 1, 1))}
     values |= {"strain_slopes": np.full((2 * n, 9, 6), np.nan), "matrix_slopes": np.full((2 * n, 9, 6, 6), np.nan)}
     values |= {"directions": np.zeros((9, 13))}

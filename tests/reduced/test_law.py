@@ -13,7 +13,8 @@ from geometry.shape_numbers import SHAPE, direction_matrix, segment_of, shape_nu
 from reduced.law import RodLaw, read_law
 from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
-from reduced.training import run_training, samples_of
+from reduced.states import sample_of
+from reduced.training import fit_path, run_training, samples_of
 
 SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
@@ -55,6 +56,7 @@ def made_up_data():
             shape["cavity_floor"] = shape["channel_height"] / 2 * (1 if kind == ONE_SIDED else rng.uniform(0.3, 1))
             s = np.array([shape[name] for name in SHAPE])
             case = {"kind": number, "design": design, "held_out": design % 5 == 4, "shape": s, "limit_pressure": np.nan}
+            case["first_touch"] = np.nan
             for f in columns():
                 if f.metadata["of"] == "cases":
                     rows[f.name].append(case.get(f.name, 0))
@@ -77,6 +79,7 @@ def made_up_data():
 def add_state(rows, row, P, strains, forces, K, prescribed):
     state = {"case": row, "prescribed": prescribed, "pressure": P, "strains": strains, "forces": forces, "stiffness": K[UPPER]}
     state |= {name: np.full(SLOPES[name], np.nan) for name in SLOPES}
+    state["wall_distance"] = rows["shape"][row][SHAPE.index("gap")] * (1 - P)
     for f in columns():
         if f.metadata["of"] == "states":
             rows[f.name].append(state.get(f.name, 0))
@@ -189,6 +192,17 @@ def test_a_table_of_designs_holds_what_single_calls_give(trained):
         assert found.e[i] == pytest.approx(one.e) and found.k[i] == pytest.approx(one.k)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_states_at_once_are_those_one_by_one(trained, kind):
+    law = trained[0].kinds[kind]
+    shape = np.repeat([shape_numbers(design(kind))], 300, axis=0)
+    P = np.linspace(0.0, 0.3, 300)
+    q = law.free_strains(shape, P)
+    assert law.path.strains(shape[1:], P[1:], np.zeros(299, int)) == pytest.approx(q[1:], abs=1e-12)
+    for i in (0, 1, 140, 299):
+        assert law.free_strains(shape[i : i + 1], P[i : i + 1])[0] == pytest.approx(q[i], abs=1e-7)
+
+
 def test_a_file_gives_the_same_law(trained):
     law, folder = trained
     again = read_law(folder / "law.npz")
@@ -203,13 +217,54 @@ def test_a_file_gives_the_same_law(trained):
     assert "law_strain_p95_rel" in (folder / "law.md").read_text()
 
 
+def test_how_far_walls_close_is_known_up_to_the_first_state_in_touch():
+    data = made_up_data()
+    first = np.full(len(data.kind), np.nan)
+    first[:2] = 0.1, PRESSURES[2]  # between levels, where it is known; at one, before which it was
+    free = sample_of(replace(data, first_touch=first), ONE_SIDED, False).free
+    met, at_level, never = (free.of(free.design == design) for design in range(3))
+    gap, lead = met.shape[0, SHAPE.index("gap")], Coordinates(ONE_SIDED).leading(met.strains)
+    touched = gap / np.interp(0.1, PRESSURES, lead)
+    assert met.closing == pytest.approx([np.nan, gap * PRESSURES[1] / lead[1], touched, np.nan, np.nan], nan_ok=True)
+    assert met.touching.tolist() == at_level.touching.tolist() == [False, False, True, True, True]
+    assert np.isfinite(at_level.closing).tolist() == [False, True, False, False, False]
+    assert np.isfinite(never.closing).sum() == 4 and not never.touching.any()
+
+
+def test_beyond_a_limit_load_strains_stay_and_it_says_so():
+    """Cells whose pressure over the leading strain falls, P = a q (1 - q), up to 0.996 of the limit load a/4."""
+    data = made_up_data()
+    rows = np.flatnonzero(~data.prescribed & (data.pressure > 0))
+    strains, pressure, lead = data.strains.copy(), data.pressure.copy(), {ONE_SIDED: 4, TWISTING: 0}
+
+    def stiff(case):
+        return 0.5 * np.exp(data.shape[case, SHAPE.index("wall")])
+
+    for i in rows:
+        case = data.case[i]
+        place = lead[KINDS[data.kind[case]]]
+        q = 0.47 * data.pressure[i] / 0.3
+        strains[i] = REST + (data.strains[i] - REST) * q / (data.strains[i] - REST)[place]
+        pressure[i] = stiff(case) * q * (1 - q)
+    train = sample_of(replace(data, strains=strains, pressure=pressure), ONE_SIDED, False).free
+    path, shape = fit_path(train), data.shape[:1].astype(float)
+    limit = stiff(0) / 4
+    at = path.at(np.repeat(shape, 4, axis=0), limit * np.array([0.5, 0.9, 1.1, 1.5]), 0)
+    assert at[0][:2] == pytest.approx([(1 - np.sqrt(0.5)) / 2, (1 - np.sqrt(0.1)) / 2], rel=1e-2)
+    assert at[1] == pytest.approx([0, 0, np.log(1.1), np.log(1.5)], abs=0.02)
+    assert at[0][2:] == pytest.approx([0.5, 0.5], abs=0.06)
+    q, slopes = path.strains_and_slopes(shape, np.array([1.5 * limit]), 0)
+    assert np.isfinite(q).all() and np.isfinite(slopes).all()
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_learned_numbers_give_strains_and_stiffness_back(kind):
     rng, co = np.random.default_rng(2), Coordinates(kind)
     shape = np.array([shape_numbers(design(kind, angle)) for angle in (50.0, 80.0)])
     P = np.array([0.1, 0.2])
     q = np.array([true_free(kind, s, p) for s, p in zip(shape, P)])
-    assert co.strains(shape, P, co.learned_strains(shape, P, q)) == pytest.approx(q)
+    learned = co.learned_strains(shape, P, q)
+    assert co.strains(shape, P * np.exp(-learned[:, 0]), learned[:, 1:]) == pytest.approx(q)
     K = np.array([true_stiffness(kind, s, p) for s, p in zip(shape, P)])
     assert co.stiffness(shape, co.learned_stiffness(shape, K)) == pytest.approx(K)
     anything = co.stiffness(shape, rng.normal(size=(2, len(co.stiffness_parity))))
