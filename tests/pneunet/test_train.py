@@ -21,8 +21,9 @@ def train(ranks, folder, name):
 def test_the_same_law_on_any_number_of_ranks(tmp_path):
     write_dataset(tmp_path / "cells.npz", made_up_data())
     text = train(1, tmp_path, "one.npz")
-    rows = ["calibrated analytic model", "analytic model and regressor of the states", "law_interval_coverage_90"]
-    for row in (*rows, "regressor of the states", "regressor of the states and their derivatives by the shape"):
+    rows = ["calibrated analytic model", "law_interval_coverage_90"]
+    rows += [f"{of}regressor of the states, by the pressure" for of in ("", "analytic model and ")]
+    for row in (*rows, *(f"regressor of the states{also}, along their path" for also in ("", " and their derivatives by the shape"))):
         assert f"| {row} |" in text
     train(3, tmp_path, "three.npz")
     for suffix in (".npz", ".md"):
