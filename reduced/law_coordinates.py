@@ -58,13 +58,14 @@ class Coordinates:
         """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a number."""
         x = np.empty((len(shape), len(LENGTHS[self.kind]) + 3))
         x[:, 0], x[:, -2], x[:, -1] = cosine(shape) ** 2, np.log(pressure + SMALL_PRESSURE), level
-        np.log(self._lengths(shape), out=x[:, 1:-2])
+        # not out=: numpy's logarithm into strided memory differs in the last bit with where that memory happens to lie
+        x[:, 1:-2] = np.log(self._lengths(shape))
         return x
 
     def path_inputs(self, shape, lead, level):
         """(n, d) the same with the leading strain (n,) in the place of the pressure."""
         x = self.inputs(shape, np.zeros(len(shape)), level)
-        np.log(lead + SMALL_STRAIN, out=x[:, -2])
+        x[:, -2] = np.log(lead + SMALL_STRAIN)
         return x
 
     def leading(self, strains):
