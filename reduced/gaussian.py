@@ -181,7 +181,7 @@ class AlongInput:
         self._constant, self._slopes, self._slope = plane[0], plane[1:], plane[1:][place] / process.width[place]
 
     def start(self, x):
-        """What `at` asks for, of inputs x (n, d): as many rows may be kept as one likes."""
+        """What `at` asks for, of inputs x (n, d): exponents (n, m), places along the way (n,) and the plane (n,)."""
         z = (x - self._process.shift) / self._process.width
         a = z @ self._process.metric
         return self._process.exponent(a), a @ self._way, self._constant + z @ self._slopes

@@ -29,7 +29,7 @@ TIE_TOLERANCE = 0.02
 SILICONES = "strains of fitted silicones differed by up to 1.2 % at P/mu = 0.1 and 7.3 % at 0.2"
 #: the gap's place among the shape numbers
 GAP = SHAPE.index("gap")
-#: lowest P/mu: the free strains are divided by it
+#: lowest P/mu, whose logarithm is taken
 LOWEST = 1e-9
 
 
@@ -100,10 +100,6 @@ class KindLaw:
         return np.column_stack([box, np.maximum(self.path.deviation(there) / self.doubt - 1, 0), beyond])
 
 
-def _mu(segment):
-    return segment.material.mu
-
-
 def closed_part(coordinates, closing, shape, pressure, strains):
     """`KindLaw.closed` by a process of States.closing."""
     load = coordinates.closing_load(pressure, strains)
@@ -135,25 +131,20 @@ class RodLaw(SegmentLaw):
 
     def table(self, segments, pressures):
         """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
-        q, pressures = np.empty((len(segments), len(pressures), 6)), checked_pressure(pressures)
+        pressures = checked_pressure(pressures)
+        q, m = np.empty((len(segments), len(pressures), 6)), len(pressures)
         for kind in {s.kind for s in segments}:
             rows = [i for i, s in enumerate(segments) if s.kind == kind]
-            chosen = [segments[i] for i in rows]
-            shape = np.repeat([shape_numbers(s) for s in chosen], len(pressures), axis=0)
-            P = np.concatenate([pressures / s.material.mu for s in chosen])
-            q[rows] = self._kind(chosen[0]).free_strains(shape, P).reshape(len(rows), -1, 6)
+            shape = np.array([shape_numbers(segments[i]) for i in rows]).repeat(m, axis=0)
+            P = np.concatenate([pressures / segments[i].material.mu for i in rows])
+            q[rows] = self._kind(segments[rows[0]]).free_strains(shape, P).reshape(-1, m, 6)
         q[..., 3:] /= np.array([normal_pitch(s) for s in segments])[:, None, None]
         return RodStrains(q[..., :3], q[..., 3:])
 
     def each(self, segments, pressure):
         """RodStrains (n, 3) of n segments at one pressure in MPa, all at once."""
-        q, pressure = np.empty((len(segments), 6)), checked_pressure(pressure)
-        for kind in {s.kind for s in segments}:
-            rows = [i for i, s in enumerate(segments) if s.kind == kind]
-            shape, mu = (np.array([f(segments[i]) for i in rows]) for f in (shape_numbers, _mu))
-            q[rows] = self._kind(segments[rows[0]]).free_strains(shape, pressure / mu)
-        q[:, 3:] /= np.array([normal_pitch(s) for s in segments])[:, None]
-        return RodStrains(q[:, :3], q[:, 3:])
+        found = self.table(segments, [pressure])
+        return RodStrains(found.e[:, 0], found.k[:, 0])
 
     def excess(self, segment, pressure):
         """(d + 2,) how far a segment at a pressure (MPa) lies outside what the law was taught; KindLaw.excess."""
