@@ -26,6 +26,8 @@ def read_archive(path, schema, what, command):
             if about.get("schema") != schema:
                 raise InputError(f"{path}: schema '{about.get('schema')}' is not '{schema}': make it again with {command}")
             yield about, stored
+    except InputError:  # a ValueError too
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: no such file: make it with {command}") from None
     except (KeyError, ValueError, OSError) as error:

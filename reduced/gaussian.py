@@ -199,13 +199,13 @@ class AlongInput:
         return value, slope, sums[:, 2] - 2 * at * sums[:, 1] + (at**2 - self._square) * sums[:, 0]
 
 
-def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, again=False, inducing=1500):
+def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, again=False, inducing=1500, noises=LOG_NOISES):
     """SideBySide processes of `widths` outputs each; the rest as for `fit`."""
     ends = np.cumsum([0, *widths])
     likes = like.processes if like else [None] * len(widths)
     slopes = slopes or no_slopes(x.shape[1], y.shape[1])
     parts = [slice(*both) for both in zip(ends, ends[1:])]
-    same = {"inducing": inducing, "again": again}
+    same = {"inducing": inducing, "again": again, "noises": noises}
     found = [fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, **same) for c, known in zip(parts, likes)]
     return SideBySide(tuple(found))
 
@@ -227,13 +227,13 @@ def _kernel(a, b):
     return np.exp(k, out=k)
 
 
-def fit(x, y, group, trust=None, slopes=None, most=400, inducing=1500, seed=0, like=None, again=False):
+def fit(x, y, group, trust=None, slopes=None, most=400, inducing=1500, seed=0, like=None, again=False, noises=LOG_NOISES):
     """The GaussianProcess through y (n, p) at x (n, d) and Slopes there.
 
     like: another one whose metric and noise are taken, or with `again` looked for once more, from there.
     group (n,): equal where noise is common. trust (n, p), the same within a group: what noises are divided by, for outputs that
     are quotients by something small.
-    Metric and noise are found on at most `most` of the observations and as many slopes.
+    Metric and noise are found on at most `most` of the observations and as many slopes; noises: bounds like LOG_NOISES.
     """
     trust, slopes = np.ones(y.shape) if trust is None else trust, slopes or no_slopes(x.shape[1], y.shape[1])
     random = np.random.default_rng(seed)
@@ -242,16 +242,16 @@ def fit(x, y, group, trust=None, slopes=None, most=400, inducing=1500, seed=0, l
     spots = np.vstack([z, z[steep.at] + AWAY * steep.ways])
     spots = spots[random.permutation(len(spots))[:inducing]] if len(spots) > inducing else spots
     if like:
-        metric, noises = like.metric, (like.noise, like.common_noise, like.slope_noise)
+        metric, found = like.metric, (like.noise, like.common_noise, like.slope_noise)
     if again or not like:
         some, steepest = (random.permutation(len(a))[:most] for a in (z, steep.at))
         extra = EXTRA if len(steep.at) else 0
-        starts = [_logarithms(metric, noises)] if like else [_start(z.shape[1], extra, *s) for s in STARTS]
-        metric, noises = _most_likely(z, y, group, trust, some, steep.of(steepest), starts, MORE_STEPS if like else MOST_STEPS)
-    return _condition(z, y, group, trust, spots, steep, shift, width, metric, noises)
+        starts = [_logarithms(metric, found)] if like else [_start(z.shape[1], extra, *s) for s in STARTS]
+        metric, found = _most_likely(z, y, group, trust, some, steep.of(steepest), starts, MORE_STEPS if like else MOST_STEPS, noises)
+    return _condition(z, y, group, trust, spots, steep, shift, width, metric, found)
 
 
-def _most_likely(z, y, group, trust, some, slopes, starts, steps):
+def _most_likely(z, y, group, trust, some, slopes, starts, steps, noises):
     """(metric, (noise, common noise, noise of slopes)) by the observations `some` and all slopes."""
     d = z.shape[1]
     points = np.vstack([z[some], z[slopes.at] - NEAR / 2 * slopes.ways, z[slopes.at] + NEAR / 2 * slopes.ways])
@@ -261,7 +261,7 @@ def _most_likely(z, y, group, trust, some, slopes, starts, steps):
         centred = v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum()
         data.append((np.vstack([centred, slopes.values[:, columns]]), 1 / np.append(t, trust[slopes.at, columns[0]])))
     same = group[some][:, None] == group[some]
-    bounds = [LOG_SCALE] * d + [(None, None)] * (len(starts[0]) - d - 3) + list(LOG_NOISES)
+    bounds = [LOG_SCALE] * d + [(None, None)] * (len(starts[0]) - d - 3) + list(noises)
     settings = {"jac": True, "method": "L-BFGS-B", "bounds": bounds, "options": {"maxiter": steps}}
     best = min((minimize(_misfit, start, (points, data, same), **settings) for start in starts), key=lambda result: result.fun).x
     return _metric(best, d), tuple(np.exp(best[-3:]).tolist())

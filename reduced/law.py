@@ -17,33 +17,31 @@ from base.strains import RodStrains
 from geometry.parameters import TWISTING
 from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
 from reduced.free_path import FreePath
+from reduced.free_stiffness import FreeStiffness
 from reduced.gaussian import GaussianProcess, SideBySide
-from reduced.law_coordinates import LENGTHS, SMALLEST, Coordinates, cosine
+from reduced.law_coordinates import LENGTHS, Coordinates, cosine
 from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, anharmonic_gradient, anharmonic_hessian, anharmonic_value, whitening
 
-SCHEMA = "pneunet-law-4"
+SCHEMA = "pneunet-law-5"
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so
 TIE_TOLERANCE = 0.02
 #: `make bench ONLY=silicones`, docs/rod-law.md
 SILICONES = "strains of fitted silicones differed by up to 1.2 % at P/mu = 0.1 and 7.3 % at 0.2"
-#: the gap's place among the shape numbers
-GAP = SHAPE.index("gap")
 #: lowest P/mu, whose logarithm is taken
 LOWEST = 1e-9
 
 
 @dataclass(frozen=True)
 class KindLaw:
-    """The law of one kind. path: of the free states; closing, stiffness: processes of Coordinates; quantile (6,): what a standard
+    """The law of one kind. path, stiffness: of the free states; anharmonic: of the enthalpy around them; quantile (6,): what a standard
     deviation of each strain is multiplied by for a 90 % interval; low, high (d,): range of the inputs; doubt: largest deviation of
     the free states' pressure that counts as known; level: the mesh that is predicted, by its place among those trained on, the
     finest last."""
 
     kind: str
     path: FreePath
-    closing: SideBySide
-    stiffness: SideBySide
+    stiffness: FreeStiffness
     anharmonic: Anharmonic
     quantile: np.ndarray
     low: np.ndarray
@@ -73,13 +71,12 @@ class KindLaw:
 
     def stiffness_at(self, shape, strains, closed):
         """(n, 6, 6) the same, of free states with these strains (n, 6) whose walls have closed so much of their gap (n,)."""
-        co = self.coordinates
-        return co.stiffness(shape, self.stiffness(co.stiffness_inputs(shape, strains, closed, self.level)))
+        return self.stiffness.at(shape, strains, closed, self.level)
 
     def closed(self, shape, pressure, strains):
         """(n,) part of the gap that walls have closed in free states with these strains (n, 6), as if they could go on: from 1 on they
         touch."""
-        return closed_part(self.coordinates, self.closing, shape, pressure, strains)
+        return self.stiffness.closed(shape, pressure, strains)
 
     def anharmonic_at(self, shape, strains, closed):
         """What reduced.potential's anharmonic forms are made of around free states with these strains (n, 6)."""
@@ -98,12 +95,6 @@ class KindLaw:
         box = np.maximum(np.maximum(self.low - x, x - self.high) - 1e-9, 0) / width
         _, beyond, there = self.path.at(shape, pressure, self.level)
         return np.column_stack([box, np.maximum(self.path.deviation(there) / self.doubt - 1, 0), beyond])
-
-
-def closed_part(coordinates, closing, shape, pressure, strains):
-    """`KindLaw.closed` by a process of States.closing."""
-    load = coordinates.closing_load(pressure, strains)
-    return closing(coordinates.closing_inputs(shape, load))[:, 0] * load / np.maximum(shape[:, GAP], SMALLEST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +256,7 @@ def _ties(segment):
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
 #: what only deviations need, kept in single precision: most of the file
 SINGLE = {"observed": "f4", "ways": "f4", "trust": "f4", "group": "i4", "at": "i4"}
-PROCESSES = ("path", "start", "closing", "stiffness")
+PROCESSES = ("path", "start", "closing", "stiffness", "contact")
 ANHARMONIC = ("coefficients", "centre", "width", "reach")
 NUMBERS = {"noise": float, "common_noise": float, "slope_noise": float}
 
@@ -274,8 +265,9 @@ def write_law(path, law):
     """Write a RodLaw (.npz)."""
     arrays = {}
     for kind, k in law.kinds.items():
-        for name, found in zip(PROCESSES, (k.path.learned, k.path.start, k.closing, k.stiffness)):
-            for number, process in enumerate(found.processes):
+        known = k.path.learned, k.path.start, k.stiffness.closing, k.stiffness.smooth, k.stiffness.contact
+        for name, found in zip(PROCESSES, known):
+            for number, process in enumerate(found.processes if found else ()):
                 for f in fields(GaussianProcess):
                     arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name), SINGLE.get(f.name))
         arrays[f"{kind}/furthest"] = np.asarray(k.path.furthest)
@@ -304,9 +296,9 @@ def _read_kind(stored, kind):
             values |= {field: number_type(values[field]) for field, number_type in NUMBERS.items()}
             processes[name].append(GaussianProcess(**values))
             number += 1
-    processes = {name: SideBySide(tuple(found)) for name, found in processes.items()}
-    processes["path"] = FreePath(kind, processes["path"], processes.pop("start"), float(stored[f"{kind}/furthest"]))
+    learned, start, *of_stiffness = (SideBySide(tuple(found)) if found else None for found in processes.values())
+    path, stiffness = FreePath(kind, learned, start, float(stored[f"{kind}/furthest"])), FreeStiffness(kind, *of_stiffness)
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, *(stored[f"{kind}/anharmonic/{name}"] for name in ANHARMONIC))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])
-    return KindLaw(kind, **processes, anharmonic=anharmonic, **plain, doubt=doubt, level=level)
+    return KindLaw(kind, path, stiffness, anharmonic, **plain, doubt=doubt, level=level)

@@ -42,6 +42,10 @@ LENGTHS = {
 SMALLEST = 1e-3
 #: of a ratio whose logarithm is taken; and part of the gap over which walls come to touch
 TINY, TOUCH_WIDTH = 1e-6, 0.01
+#: of a normal pitch, by which walls would overlap
+SMALL_OVERLAP = 0.01
+#: the gap's place among the shape numbers
+GAP = SHAPE.index("gap")
 #: kind -> (index of the leading strain, of the others that are not zero)
 LEADING = {ONE_SIDED: (4, (0, 1, 3)), TWISTING: (0, (3,))}
 #: kind -> blocks of the stiffness
@@ -84,19 +88,28 @@ class Coordinates:
         x = self.inputs(shape, np.zeros(len(shape)), 0)
         return np.column_stack([x[:, :-2], load])
 
-    def stiffness_inputs(self, shape, strains, closed, level):
-        """(n, d + 1) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place of the pressure, and
-        whether walls touch, from 0 to 1, when they have `closed` (n,) so much of their gap, as if they could go on. (What softens a
-        cell is how far it has gone; measured: a fifth off the error. Where walls meet, the stiffness jumps; measured: half off the
-        error in twisting segments.)"""
+    def stiffness_inputs(self, shape, strains, level):
+        """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place of the pressure. (What
+        softens a cell is how far it has gone; measured: a fifth off the error.)"""
         x = self.inputs(shape, np.zeros(len(shape)), level)
         x[:, -2] = self.leading(strains)
-        beyond = np.log(np.maximum(closed, TINY)) / TOUCH_WIDTH
-        return np.insert(x, -1, 1 / (1 + np.exp(-np.clip(beyond, -30, 30))), axis=1)
+        return x
+
+    def contact_inputs(self, shape, strains, closed):
+        """(n, d) those of what contact adds to it, the same, whatever the mesh: by how much walls would overlap, having `closed` (n,)
+        so much of their gap, in the mesh's place."""
+        x = self.stiffness_inputs(shape, strains, 0)
+        x[:, -1] = np.log(np.maximum(closed - 1, 0) * shape[:, GAP] + SMALL_OVERLAP)
+        return x
+
+    @staticmethod
+    def touch(closed):
+        """(n,) from 0 to 1, whether walls touch that have closed so much (n,) of their gap, as if they could go on."""
+        return 1 / (1 + np.exp(-np.clip(np.log(np.maximum(closed, TINY)) / TOUCH_WIDTH, -30, 30)))
 
     def around_inputs(self, shape, strains, closed):
-        """(n, d) what the enthalpy around free states depends on: the same, whatever the mesh."""
-        return self.stiffness_inputs(shape, strains, closed, 0)[:, :-1]
+        """(n, d + 1) what the enthalpy around free states depends on: the same, and whether walls touch."""
+        return np.column_stack([self.contact_inputs(shape, strains, closed), self.touch(closed)])
 
     @cached_property
     def _sums(self):
@@ -173,6 +186,15 @@ class Coordinates:
         i, j = np.tril_indices(len(block), -1)
         s = MIRROR[list(block)]
         return np.concatenate([np.ones(len(block)), s[i] * s[j]])
+
+    @property
+    def bending(self):
+        """Place of the bending stiffness, that of k2, among what is learned: what contact adds most to."""
+        start = 0
+        for block in BLOCKS[self.kind]:
+            if 4 in block:
+                return start + block.index(4)
+            start += len(block) * (len(block) + 1) // 2
 
     def learned_stiffness(self, shape, matrices):
         """(n, p) from stiffness (n, 6, 6), of which what the symmetries forbid is left out. Not positive definite: nan."""

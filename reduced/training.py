@@ -22,8 +22,9 @@ from base.materials import NeoHookean
 from geometry.shape_numbers import segment_of
 from reduced import gaussian
 from reduced.free_path import FreePath
+from reduced.free_stiffness import FreeStiffness, order
 from reduced.judging import PITCH, figures, finest_mesh, misses, strain_error, symmetric
-from reduced.law import LOWEST, KindLaw, RodLaw, closed_part, write_law
+from reduced.law import LOWEST, KindLaw, RodLaw, write_law
 from reduced.law_coordinates import REST, Coordinates, cosine, odd
 from reduced.model import AnalyticModel
 from reduced.potential import fit_anharmonic
@@ -51,6 +52,9 @@ STEP = 1e-4
 #: to its limit load or walls are just touching, where derivatives grow without bound. (Those of the stiffness where walls touch are left
 #: out altogether; measured: with them its error is a fifth larger.)
 STEEPEST = 1.0
+#: designs seen to touch that suffice to learn what contact adds to the stiffness; and bounds of its noises: mesh points come into contact
+#: one by one
+TELLING, CONTACT_NOISES = 10, tuple((low, np.log(most)) for (low, _), most in zip(gaussian.LOG_NOISES, (1e-2, 1e-2, 1.0)))
 #: of the angle, below which derivatives along it are not used
 SMALLEST_COSINE = 0.2
 
@@ -117,33 +121,51 @@ def fit_closing(states, like=None, again=False):
     return gaussian.fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), None, like, again)
 
 
-def fit_stiffness(states, closing, like=None, again=False):
-    """Gaussian process of the learned stiffness; closing: of `fit_closing`."""
+def fit_stiffness(states, like=None, again=False):
+    """The FreeStiffness of free states."""
+    co = Coordinates(states.kind)
+    closing = fit_closing(states, like and like.closing, again)
+    y = co.learned_stiffness(states.shape, states.matrices)
+    good, touching = np.isfinite(y).all(axis=1), states.touching
+    if len(np.unique(states.design[touching & good])) < TELLING:
+        return FreeStiffness(states.kind, closing, _fit_smooth(states.of(good), like and like.smooth, again), None)
+    smooth = _fit_smooth(states.of(good & ~touching), like and like.smooth, again)
+    states, y = states.of(good & touching), y[good & touching]
+    closed = FreeStiffness(states.kind, closing, smooth, None).closed(states.shape, states.pressure, states.strains)
+    added = (y - smooth(co.stiffness_inputs(states.shape, states.strains, states.level)))[:, order(co)]
+    trust, x = _trust_in_stiffness(states)[:, order(co)], co.contact_inputs(states.shape, states.strains, closed)
+    settings = {"like": like and like.contact, "again": again, "noises": CONTACT_NOISES}
+    contact = gaussian.fit_side_by_side(x, added, states.case, trust, (1, added.shape[1] - 1), **settings)
+    return FreeStiffness(states.kind, closing, smooth, contact)
+
+
+def _trust_in_stiffness(states):
+    return odd(Coordinates(states.kind).stiffness_parity, np.abs(cosine(states.shape)))
+
+
+def _fit_smooth(states, like, again):
     co = Coordinates(states.kind)
 
     def inputs(shape, strains, matrices, s):
-        return co.stiffness_inputs(shape, strains, closed_part(co, closing, shape, s.pressure, strains), s.level)
+        return co.stiffness_inputs(shape, strains, s.level)
 
     def outputs(shape, strains, matrices, s):
         return co.learned_stiffness(shape, matrices)
 
-    y = outputs(states.shape, None, states.matrices, states)
-    good = np.isfinite(y).all(axis=1)
-    trust = odd(co.stiffness_parity, np.abs(cosine(states.shape)))
+    x, y = inputs(states.shape, states.strains, None, states), outputs(states.shape, None, states.matrices, states)
     known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states) & ~states.touching[:, None]
-    x, steep = inputs(states.shape, states.strains, None, states), slopes_of(states, known, inputs, outputs, good)
+    steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
     steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
-    return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (y.shape[1],), steep, like, again)
+    return gaussian.fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, like, again)
 
 
 def fit_kind(sample, like=None):
     """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts."""
     states, around = sample.free, sample.around
     path = fit_path(states, like and like.path, again=True)
-    closing = fit_closing(states, like and like.closing, again=True)
-    stiffness = fit_stiffness(states, closing, like and like.stiffness, again=True)
+    stiffness = fit_stiffness(states, like and like.stiffness, again=True)
     co = Coordinates(states.kind)
-    closed = closed_part(co, closing, around.shape, around.pressure, around.strains)
+    closed = stiffness.closed(around.shape, around.pressure, around.strains)
     x = co.around_inputs(around.shape, around.strains, closed)
     anharmonic = fit_anharmonic(states.kind, x, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces)
     x = states.inputs
@@ -152,7 +174,7 @@ def fit_kind(sample, like=None):
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
     low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
     low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
-    law = KindLaw(states.kind, path, closing, stiffness, anharmonic, np.ones(6), low, high, doubt, level)
+    law = KindLaw(states.kind, path, stiffness, anharmonic, np.ones(6), low, high, doubt, level)
     return replace(law, quantile=_quantiles(law, states.loaded))
 
 

@@ -10,11 +10,12 @@ from base.errors import InputError
 from base.materials import NeoHookean, Yeoh
 from geometry.parameters import KINDS, ONE_SIDED, TWISTING
 from geometry.shape_numbers import SHAPE, direction_matrix, segment_of, shape_numbers
+from reduced.judging import stiffness_error
 from reduced.law import RodLaw, read_law
 from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
 from reduced.states import sample_of
-from reduced.training import fit_path, run_training, samples_of
+from reduced.training import fit_path, fit_stiffness, run_training, samples_of
 
 SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
@@ -229,6 +230,30 @@ def test_how_far_walls_close_is_known_up_to_the_first_state_in_touch():
     assert met.touching.tolist() == at_level.touching.tolist() == [False, False, True, True, True]
     assert np.isfinite(at_level.closing).tolist() == [False, True, False, False, False]
     assert np.isfinite(never.closing).sum() == 4 and not never.touching.any()
+
+
+def test_stiffness_jumps_where_walls_touch():
+    """Walls of twisting cells close in proportion to the pressure; in touch, bending is stiffer by a factor and by how far they overlap."""
+    data = made_up_data()
+    wall, gap = (data.shape[:, SHAPE.index(name)].astype(float) for name in ("wall", "gap"))
+    first = 0.16 * np.exp(wall - 0.2)
+    closed = data.pressure / first[data.case]
+    added = np.where(closed > 1, 0.4 + wall[data.case] + (closed - 1) * gap[data.case], 0.0)
+    K = data.matrices.copy()
+    K[:, 4, 4] += (np.exp(added) - 1) * (K[:, 4, 4] - K[:, 4, 1] ** 2 / K[:, 1, 1])  # the last pivot of its block alone
+    touched = replace(
+        data,
+        first_touch=first.astype("f4"),
+        stiffness=K[(slice(None), *UPPER)].astype("f4"),
+        wall_distance=(np.maximum(1 - closed, 0) * gap[data.case]).astype("f4"),
+    )
+    learned, seen = (sample_of(touched, TWISTING, held_out).free for held_out in (False, True))
+    stiffness = fit_stiffness(learned)
+    closed = stiffness.closed(seen.shape, seen.pressure, seen.strains)
+    assert (closed > 1).tolist() == seen.touching.tolist() and 0.2 < seen.touching.mean() < 0.8
+    assert stiffness_error(seen, stiffness.at(seen.shape, seen.strains, closed, 0)).max() < 0.05
+    few = fit_stiffness(learned.of(np.isin(learned.design, np.unique(learned.design)[:8])))
+    assert few.contact is None
 
 
 def test_beyond_a_limit_load_strains_stay_and_it_says_so():
