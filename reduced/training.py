@@ -31,7 +31,7 @@ from reduced.potential import fit_anharmonic
 from reduced.states import folds, sample_of, splits
 
 #: of the cross-validation that intervals come from
-FOLDS = 5
+FOLDS = 10
 INTERVAL = 0.9
 #: parts of the training designs in the learning curve
 CURVE = (0.25, 0.5, 1.0)
@@ -55,6 +55,8 @@ STEEPEST = 1.0
 #: designs seen to touch that suffice to learn what contact adds to the stiffness; and bounds of its noises: mesh points come into contact
 #: one by one
 TELLING, CONTACT_NOISES = 10, tuple((low, np.log(most)) for (low, _), most in zip(gaussian.LOG_NOISES, (1e-2, 1e-2, 1.0)))
+#: states that the metric of how far walls close is found on: without slopes, and with one output, more cost little
+MANY = 1200
 #: of the angle, below which derivatives along it are not used
 SMALLEST_COSINE = 0.2
 
@@ -110,7 +112,8 @@ def fit_path(states, like=None, again=False, slopes=True):
 
 def _fit_strains(states, good, x, y, slopes=None, like=None, again=False):
     trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.shape)))
-    return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), slopes, like, again, INDUCING)
+    settings = {"slopes": slopes, "like": like, "again": again, "inducing": INDUCING}
+    return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), **settings)
 
 
 def fit_closing(states, like=None, again=False):
@@ -118,7 +121,7 @@ def fit_closing(states, like=None, again=False):
     states = states.of(np.isfinite(states.closing))
     co = Coordinates(states.kind)
     x, y = co.closing_inputs(states.shape, co.closing_load(states.pressure, states.strains)), states.closing[:, None]
-    return gaussian.fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), None, like, again)
+    return gaussian.fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), like=like, again=again, most=MANY)
 
 
 def fit_stiffness(states, like=None, again=False):
@@ -156,7 +159,7 @@ def _fit_smooth(states, like, again):
     known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states) & ~states.touching[:, None]
     steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
     steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
-    return gaussian.fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, like, again)
+    return gaussian.fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, like, again=again)
 
 
 def fit_kind(sample, like=None):
