@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from reduced.gaussian import ROWS, AlongInput, SideBySide
+from reduced.along_input import AlongInput
+from reduced.gaussian import ROWS, SideBySide
 from reduced.law_coordinates import LEADING, SMALL_STRAIN, Coordinates, cosine, odd
 
 #: steps over the slope that end the search, of log(leading strain): what is left after them is of third order (measured: at most 5e-5
