@@ -5,7 +5,8 @@ import numpy as np
 
 class AlongInput:
     """The first output of a GaussianProcess at inputs of which one, that at `place`, changes: what is left to do for each change is an
-    exponential for each inducing point."""
+    exponential for each inducing point. With a = (inputs in the process's units) metric and b an inducing point, the kernel after a change
+    t along the way w is exp(-|a + t w - b|^2/2) = kernel(t = 0) exp(t b.w) exp(-t (2 a.w + t w.w)/2)."""
 
     def __init__(self, process, place):
         self._process, m = process, len(process.points)

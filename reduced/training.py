@@ -39,7 +39,8 @@ CURVE = (0.25, 0.5, 1.0)
 MARGIN = 0.02
 
 #: points that the free states are summed up on, as many as 10,000 of them may cost in a quarter of a second; and those of the rough
-#: process that the search for the leading strain starts from: within some 2 % of it, from where one step is enough
+#: process that the search for the leading strain starts from: within some 3 % of it (measured: median), from where one step is
+#: mostly enough
 INDUCING, ROUGH = 1300, 300
 #: times the largest leading strain of the training designs: up to there paths of free states are followed
 FURTHEST = 1.2
@@ -143,10 +144,12 @@ def fit_stiffness(states, like=None, again=False):
 
 
 def _trust_in_stiffness(states):
+    """(n, p) trust of gaussian.fit in what is learned of the stiffness: what is odd in the angle's cosine was divided by it."""
     return odd(Coordinates(states.kind).stiffness_parity, np.abs(cosine(states.shape)))
 
 
 def _fit_smooth(states, like, again):
+    """Gaussian process of Coordinates.learned_stiffness, by slopes too where walls do not touch."""
     co = Coordinates(states.kind)
 
     def inputs(shape, strains, matrices, s):

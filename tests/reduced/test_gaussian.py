@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reduced.gaussian import NEAR, TREND, Slopes, _misfit, fit
+from reduced.gaussian import NEAR, TREND, Slopes, _misfit, _spread_over, fit
 
 
 def observed(n, seed=0):
@@ -69,3 +69,10 @@ def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():
     for i in range(2):
         step = h * np.eye(2)[i]
         assert (process(new + step) - process(new - step)) / (2 * h) == pytest.approx(slopes[:, :, i], abs=1e-5)
+
+
+def test_the_metric_is_found_on_one_state_of_each_path_first():
+    groups = np.array([7, 7, 7, 7, 2, 2, 5, 7, 2, 7])
+    rows = _spread_over(groups, np.random.default_rng(0))
+    assert sorted(rows) == list(range(10))
+    assert [sorted(groups[rows[i:j]]) for i, j in ((0, 3), (3, 5), (5, 7), (7, 10))] == [[2, 5, 7], [2, 7], [2, 7], [7, 7, 7]]
