@@ -24,7 +24,7 @@ def taken_over(campaign, path):
     about = data.about
     for key, value in {**campaign.table, "ranges": campaign.ranges}.items():
         theirs = {**about["campaign"], "ranges": about["ranges"]}.get(key)
-        if key != "designs" and theirs != json.loads(json.dumps(value)):
+        if not key.endswith("designs") and theirs != json.loads(json.dumps(value)):
             raise InputError(f"{path}: its sample has {key} = {theirs}, the campaign's {value}: extend it with the same")
     meshes, cases = {mesh["name"]: mesh for mesh in about["meshes"]}, {}
     places = zip(data.kind.tolist(), data.design.tolist(), data.mesh.tolist())

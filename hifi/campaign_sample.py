@@ -38,6 +38,9 @@ RANGES[TWISTING] = {name: both for name, both in RANGES[ONE_SIDED].items() if na
 }
 #: prescribed states that an index has places for; a campaign takes the first of them
 PLACES = 16
+#: of is_slender. (Measured: of 500 designs of either kind the walls of 85 to 95 % of those that come to touch lie above, three quarters
+#: of those above do.)
+SLENDER = 18.0
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,11 @@ def segments(kind, ranges, count, seed):
     low, high = np.array([ranges[name] for name in names]).T
     points = _sobol(len(names), count, seed + KINDS.index(kind))
     return [_segment(kind, dict(zip(names, (low + p * (high - low)).round(4).tolist()))) for p in points]
+
+
+def is_slender(segment):
+    """Whether a Segment's walls probably come to touch: high chambers with thin walls and little room between them."""
+    return segment.chamber_height**2 > SLENDER * segment.wall * segment.gap
 
 
 def _segment(kind, v):

@@ -8,13 +8,14 @@ from base.materials import material_to_table
 from base.processes import Limits
 from base.tables import as_table, number, read_toml, refuse_unknown, to_table
 from geometry.parameters import KINDS
-from hifi.campaign_sample import PLACES, RANGES, prescribed_states, segments
+from hifi.campaign_sample import PLACES, RANGES, is_slender, prescribed_states, segments
 from hifi.cases import Case
 
 FUNCTION = "hifi.campaign_case:solve_campaign_case"
 #: s; one case
 DEFAULT_TIME = 3600.0
-KEYS = ("kinds", "designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share", "mesh", "ranges", "limits")
+KEYS = ("kinds", "designs", "slender_designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share")
+KEYS += ("mesh", "ranges", "limits")
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ def read_campaign(path):
     if not isinstance(kinds, list) or not kinds or any(k not in KINDS for k in kinds):
         raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting'")
     count = value("designs", 250, 1, 100_000, integer=True)
+    slender = value("slender_designs", 0, 0, 100_000, integer=True)
     seed = value("seed", 1, 0, 2**31, integer=True)
     held_out_every = value("held_out_every", 5, 2, 1000, integer=True)
     common = {
@@ -88,22 +90,24 @@ def read_campaign(path):
     ranges = _ranges(as_table(data.get("ranges", {}), f"{where} [ranges]"), kinds, f"{where} [ranges]")
     limits = as_table(data.get("limits", {}), f"{where} [limits]")
     refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
-    designs = []
+    designs, furthest = [], max(count, slender)
     for kind in kinds:
-        held = prescribed_states(kind, count, max(m.prescribed for m in meshes), seed)
+        held = prescribed_states(kind, furthest, max(m.prescribed for m in meshes), seed)
         try:
-            bodies = segments(kind, ranges[kind], count, seed)
+            bodies = segments(kind, ranges[kind], furthest, seed)
         except InputError as error:
             raise InputError(f"{where} [ranges.{kind}]: they hold impossible bodies: {error}") from None
         for index, segment in enumerate(bodies):
+            judge = is_held_out(index, held_out_every)
+            if index >= count and (judge or not is_slender(segment)):
+                continue
             for mesh in meshes:
                 if index % mesh.every == 0:
-                    judge = is_held_out(index, held_out_every)
                     prescribed = held[index][: mesh.prescribed_of(index)]
                     case = _case(kind, index, mesh, segment, prescribed, common | {"slopes": mesh.slopes and not judge})
                     designs.append(Design(kind, index, mesh, judge, segment, case))
     designs.sort(key=lambda d: d.index)
-    table = {"designs": count, "seed": seed, "held_out_every": held_out_every, **common}
+    table = {"designs": count, "slender_designs": slender, "seed": seed, "held_out_every": held_out_every, **common}
     return Campaign(
         tuple(designs), tuple(kinds), meshes, ranges, Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")), table
     )

@@ -10,16 +10,15 @@ class AlongInput:
 
     def __init__(self, process, place):
         self._process, m = process, len(process.points)
-        way = process.metric[place] / process.width[place]
-        weights, plane = process.weights[:m, 0], process.weights[m:, 0]
+        way, weights = process.to_kernel[place], process.weights[:m, 0]
         self._way, self._b, self._square = way, process.points @ way, way @ way
         self._weights = np.stack([weights, weights * self._b, weights * self._b**2], axis=1)
-        self._constant, self._slopes, self._slope = plane[0], plane[1:], plane[1:][place] / process.width[place]
+        self._constant, self._slopes, self._slope = process.weights[m, 0], process.plane[:, 0], process.plane[place, 0]
 
     def start(self, x):
         """What `at` asks for, of inputs x (n, d): exponents (n, m), places along the way (n,) and the plane (n,)."""
-        z = (x - self._process.shift) / self._process.width
-        a = z @ self._process.metric
+        z = x - self._process.shift
+        a = z @ self._process.to_kernel
         return self._process.exponent(a), a @ self._way, self._constant + z @ self._slopes
 
     def at(self, start, change):

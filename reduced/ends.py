@@ -22,11 +22,12 @@ def end_turn(segment, free):
 def free_manipulator(segments, strains, counts):
     """(lengths (3 n,) in mm, RodStrains (3 n, 3)) of n segments in a row: the pieces of each, at its cells' free RodStrains (n, 3);
     counts: of chambers, real numbers."""
-    lengths, e, k = np.empty((len(segments), 3)), np.zeros((len(segments), 3, 3)), np.zeros((len(segments), 3, 3))
+    n, bare = len(segments), [s.end_wall for s in segments]
+    lengths, e, k = np.empty((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 3, 3))
+    lengths[:, 0] = lengths[:, 2] = bare
+    lengths[:, 1] = [count * s.pitch for s, count in zip(segments, counts)]
     e[:, :, 0], e[:, 1], k[:, 1] = 1.0, strains.e, strains.k
-    for i, (segment, count, free) in enumerate(zip(segments, counts, np.hstack([strains.e, strains.k]))):
-        bare = segment.end_wall
-        lengths[i] = bare, count * segment.pitch, bare
-        k[i, 0, 2] = end_turn(segment, free) / bare
+    free = np.hstack([strains.e, strains.k]).tolist()
+    k[:, 0, 2] = [end_turn(*each) / length for *each, length in zip(segments, free, bare)]
     k[:, 2, 2] = -k[:, 0, 2]
     return lengths.ravel(), RodStrains(e.reshape(-1, 3), k.reshape(-1, 3))

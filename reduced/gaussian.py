@@ -95,6 +95,16 @@ class GaussianProcess:
         return self.inducing @ self.metric
 
     @cached_property
+    def to_kernel(self):
+        """(d, e): inputs less `shift` times it are where distances are the kernel's."""
+        return self.metric / self.width[:, None]
+
+    @cached_property
+    def plane(self):
+        """(d, p): the plane's slopes by the inputs."""
+        return self.weights[len(self.points) + 1 :] / self.width[:, None]
+
+    @cached_property
     def _half(self):
         return _half_squares(self.points)
 
@@ -123,20 +133,18 @@ class GaussianProcess:
         if len(x) > ROWS:
             parts = [self(x[i : i + ROWS], derivative) for i in range(0, len(x), ROWS)]
             return tuple(map(np.concatenate, zip(*parts))) if derivative else np.concatenate(parts)
-        z = (x - self.shift) / self.width
-        a, m = z @ self.metric, len(self.points)
-        smooth, constant, slopes = self.weights[:m], self.weights[m], self.weights[m + 1 :]
+        z, m = x - self.shift, len(self.points)
+        a = z @ self.to_kernel
         kernel = self.exponent(a)
         np.exp(kernel, out=kernel)
-        curved = kernel @ smooth
-        mean = curved + constant + z @ slopes
+        curved = kernel @ self.weights[:m]
+        mean = curved + self.weights[m] + z @ self.plane
         if not derivative:
             return mean
         # d k(a, b)/d a = k (b - a)
-        p = smooth.shape[1]
         first = kernel @ self._weighed_points
-        slope = first.reshape(len(x), p, -1) - curved[:, :, None] * a[:, None, :]
-        return mean, (slope @ self.metric.T + slopes.T) / self.width
+        slope = first.reshape(len(x), curved.shape[1], -1) - curved[:, :, None] * a[:, None, :]
+        return mean, slope @ self.to_kernel.T + self.plane.T
 
     def deviation(self, x):
         """(n, p) standard deviation of the outputs, without noise."""

@@ -123,14 +123,15 @@ class RodLaw(SegmentLaw):
     def table(self, segments, pressures):
         """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
         pressures = checked_pressure(pressures)
-        q, m = np.empty((len(segments), len(pressures), 6)), len(pressures)
-        for kind in {s.kind for s in segments}:
-            rows = [i for i, s in enumerate(segments) if s.kind == kind]
-            shape = np.array([shape_numbers(segments[i]) for i in rows]).repeat(m, axis=0)
-            P = np.concatenate([pressures / segments[i].material.mu for i in rows])
-            q[rows] = self._kind(segments[rows[0]]).free_strains(shape, P).reshape(-1, m, 6)
-        q[..., 3:] /= np.array([normal_pitch(s) for s in segments])[:, None, None]
-        return RodStrains(q[..., :3], q[..., 3:])
+        kinds, m = [s.kind for s in segments], len(pressures)
+        shape = np.array([shape_numbers(s) for s in segments])
+        P = pressures / np.array([s.material.mu for s in segments])[:, None]
+        q = np.empty((len(segments), m, 6))
+        for kind in set(kinds):
+            rows = [i for i, k in enumerate(kinds) if k == kind]
+            law = self._kind(segments[rows[0]])
+            q[rows] = law.free_strains(shape[rows].repeat(m, axis=0), P[rows].ravel()).reshape(-1, m, 6)
+        return RodStrains(q[..., :3], q[..., 3:] / np.array([normal_pitch(s) for s in segments])[:, None, None])
 
     def each(self, segments, pressure):
         """RodStrains (n, 3) of n segments at one pressure in MPa, all at once."""

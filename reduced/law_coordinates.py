@@ -135,7 +135,7 @@ class Coordinates:
         return np.array([angle, *np.exp(inputs[1:-2]), max(np.exp(inputs[-2]) - SMALL_PRESSURE, 0.0), inputs[-1]])
 
     # ---- free strains
-    @property
+    @cached_property
     def strain_parity(self):
         """(p,) of the learned strains: 1 even, -1 odd."""
         lead, others = LEADING[self.kind]
@@ -150,11 +150,15 @@ class Coordinates:
 
     def strains(self, shape, lead, ratios):
         """(n, 6) of the leading strain (n,) and the others' learned ratios (n, p - 1)."""
+        of_lead, of_others = self._places
+        lead = lead[:, None]
+        return REST + lead * of_lead + (lead * ratios * odd(self.strain_parity[1:], cosine(shape))) @ of_others
+
+    @cached_property
+    def _places(self):
+        """(6,) and (p - 1, 6): where the leading strain and the others stand among all."""
         first, others = LEADING[self.kind]
-        q = np.zeros((len(lead), 6))
-        q[:, first] = lead
-        q[:, others] = ratios * odd(self.strain_parity[1:], cosine(shape)) * lead[:, None]
-        return q + REST
+        return np.eye(6)[first], np.eye(6)[list(others)]
 
     def by_shape(self, shape, slopes):
         """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, d) by inputs; one more, 0, for the pressure."""
