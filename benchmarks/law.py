@@ -4,7 +4,7 @@ held-out designs computed again from data set and law; and what it costs.
 
 import numpy as np
 
-from benchmarks import silicones
+from benchmarks import remeshed, silicones
 from benchmarks.rod import best_seconds
 from benchmarks.tables import below_mark, table
 
@@ -78,10 +78,12 @@ def costs(shipped):
     }
 
 
-def page(text, details, materials):
-    """docs/rod-law.md, of which `text` is the present one, with the part below its mark made anew; materials: what the part `silicones`
-    has found, or None."""
-    lines = silicones.lines(materials["details"]) if materials else []
+def page(text, details, meta):
+    """docs/rod-law.md, of which `text` is the present one, with the part below its mark made anew; meta: of the other parts, of which
+    `silicones` and `remeshed` have something to say here."""
+    lines = []
+    for name, part in (("silicones", silicones), ("remeshed", remeshed)):
+        lines += part.lines(meta[name]["details"]) if name in meta else []
     lines.append("## How well it does")
     for kind, found in details.items():
         lines += ["", f"### {kind}", "", found["judged on"], ""]
