@@ -8,13 +8,15 @@ from base.materials import material_to_table
 from base.processes import Limits
 from base.tables import as_table, number, read_toml, refuse_unknown, to_table
 from geometry.parameters import KINDS
-from hifi.campaign_sample import PLACES, RANGES, is_slender, prescribed_states, segments
+from hifi.campaign_sample import PLACES, RANGES, prescribed_states, segments
 from hifi.cases import Case
 
 FUNCTION = "hifi.campaign_case:solve_campaign_case"
 #: s; one case
 DEFAULT_TIME = 3600.0
-KEYS = ("kinds", "designs", "slender_designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share")
+#: index of the first edge design, and what their seed is more: both sequences can be extended
+EDGES, EDGE_SEED = 100_000, 200
+KEYS = ("kinds", "designs", "edge_designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share")
 KEYS += ("mesh", "ranges", "limits")
 
 
@@ -78,7 +80,7 @@ def read_campaign(path):
     if not isinstance(kinds, list) or not kinds or any(k not in KINDS for k in kinds):
         raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting'")
     count = value("designs", 250, 1, 100_000, integer=True)
-    slender = value("slender_designs", 0, 0, 100_000, integer=True)
+    edges = value("edge_designs", 0, 0, 100_000, integer=True)
     seed = value("seed", 1, 0, 2**31, integer=True)
     held_out_every = value("held_out_every", 5, 2, 1000, integer=True)
     common = {
@@ -90,24 +92,22 @@ def read_campaign(path):
     ranges = _ranges(as_table(data.get("ranges", {}), f"{where} [ranges]"), kinds, f"{where} [ranges]")
     limits = as_table(data.get("limits", {}), f"{where} [limits]")
     refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
-    designs, furthest = [], max(count, slender)
+    designs, places = [], max(m.prescribed for m in meshes)
     for kind in kinds:
-        held = prescribed_states(kind, furthest, max(m.prescribed for m in meshes), seed)
+        held_out = [is_held_out(index, held_out_every) for index in range(count)] + [False] * edges
+        prescribed = prescribed_states(kind, count, places, seed) + prescribed_states(kind, edges, places, seed + EDGE_SEED)
         try:
-            bodies = segments(kind, ranges[kind], furthest, seed)
+            bodies = segments(kind, ranges[kind], count, seed) + segments(kind, ranges[kind], edges, seed + EDGE_SEED, at_edges=True)
         except InputError as error:
             raise InputError(f"{where} [ranges.{kind}]: they hold impossible bodies: {error}") from None
-        for index, segment in enumerate(bodies):
-            judge = is_held_out(index, held_out_every)
-            if index >= count and (judge or not is_slender(segment)):
-                continue
+        for index, segment, judge, states in zip([*range(count), *range(EDGES, EDGES + edges)], bodies, held_out, prescribed):
             for mesh in meshes:
                 if index % mesh.every == 0:
-                    prescribed = held[index][: mesh.prescribed_of(index)]
-                    case = _case(kind, index, mesh, segment, prescribed, common | {"slopes": mesh.slopes and not judge})
+                    settings = common | {"slopes": mesh.slopes and not judge}
+                    case = _case(kind, index, mesh, segment, states[: mesh.prescribed_of(index)], settings)
                     designs.append(Design(kind, index, mesh, judge, segment, case))
     designs.sort(key=lambda d: d.index)
-    table = {"designs": count, "slender_designs": slender, "seed": seed, "held_out_every": held_out_every, **common}
+    table = {"designs": count, "edge_designs": edges, "seed": seed, "held_out_every": held_out_every, **common}
     return Campaign(
         tuple(designs), tuple(kinds), meshes, ranges, Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")), table
     )
