@@ -22,10 +22,10 @@ def taken_over(campaign, path):
     """What the data set at `path` knows of a Campaign's cases, found by kind, index and mesh. InputError when its sample is another."""
     data = read_dataset(path)
     about = data.about
-    for key, value in {**campaign.table, "ranges": campaign.ranges}.items():
-        theirs = {**about["campaign"], "ranges": about["ranges"]}.get(key)
-        if not key.endswith("designs") and theirs != json.loads(json.dumps(value)):
-            raise InputError(f"{path}: its sample has {key} = {theirs}, the campaign's {value}: extend it with the same")
+    theirs = {**about["campaign"], "ranges": about["ranges"]}
+    for key, value in json.loads(json.dumps({**campaign.table, "ranges": campaign.ranges})).items():
+        if not key.endswith("designs") and theirs.get(key, value) != value:
+            raise InputError(f"{path}: its sample has {key} = {theirs[key]}, the campaign's {value}: extend it with the same")
     meshes, cases = {mesh["name"]: mesh for mesh in about["meshes"]}, {}
     places = zip(data.kind.tolist(), data.design.tolist(), data.mesh.tolist())
     rows = {(about["kinds"][k], d, about["meshes"][m]["name"]): row for row, (k, d, m) in enumerate(places)}

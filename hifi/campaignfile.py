@@ -17,7 +17,7 @@ DEFAULT_TIME = 3600.0
 #: index of the first edge design, and what their seed is more: both sequences can be extended
 EDGES, EDGE_SEED = 100_000, 200
 KEYS = ("kinds", "designs", "edge_designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share")
-KEYS += ("mesh", "ranges", "limits")
+KEYS += ("mesh", "ranges", "edge_ranges", "limits")
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ def read_campaign(path):
         "limit_share": float(value("limit_share", 0.9, 0.1, 0.99)),
     }
     meshes = _meshes(data.get("mesh", [{"name": "coarse", "mesh_size_mm": 2.0}]), where)
-    ranges = _ranges(as_table(data.get("ranges", {}), f"{where} [ranges]"), kinds, f"{where} [ranges]")
+    ranges = _ranges(data, "ranges", kinds, where, RANGES)
+    edge_ranges = _ranges(data, "edge_ranges", kinds, where, ranges)
     limits = as_table(data.get("limits", {}), f"{where} [limits]")
     refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
     designs, places = [], max(m.prescribed for m in meshes)
@@ -97,7 +98,7 @@ def read_campaign(path):
         held_out = [is_held_out(index, held_out_every) for index in range(count)] + [False] * edges
         prescribed = prescribed_states(kind, count, places, seed) + prescribed_states(kind, edges, places, seed + EDGE_SEED)
         try:
-            bodies = segments(kind, ranges[kind], count, seed) + segments(kind, ranges[kind], edges, seed + EDGE_SEED, at_edges=True)
+            bodies = segments(kind, ranges[kind], count, seed) + segments(kind, edge_ranges[kind], edges, seed + EDGE_SEED, at_edges=True)
         except InputError as error:
             raise InputError(f"{where} [ranges.{kind}]: they hold impossible bodies: {error}") from None
         for index, segment, judge, states in zip([*range(count), *range(EDGES, EDGES + edges)], bodies, held_out, prescribed):
@@ -108,6 +109,7 @@ def read_campaign(path):
                     designs.append(Design(kind, index, mesh, judge, segment, case))
     designs.sort(key=lambda d: d.index)
     table = {"designs": count, "edge_designs": edges, "seed": seed, "held_out_every": held_out_every, **common}
+    table["edge_ranges"] = {k: {name: r for name, r in edge_ranges[k].items() if r != ranges[k][name]} for k in kinds}
     return Campaign(
         tuple(designs), tuple(kinds), meshes, ranges, Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")), table
     )
@@ -160,14 +162,16 @@ def _meshes(rows, where):
     return tuple(meshes)
 
 
-def _ranges(table, kinds, where):
-    """{kind: {variable: (low, high)}}: the default ones, replaced by [ranges.KIND]."""
+def _ranges(data, name, kinds, where, default):
+    """{kind: {variable: (low, high)}}: the default ones, replaced by [NAME.KIND]."""
+    where = f"{where} [{name}]"
+    table = as_table(data.get(name, {}), where)
     refuse_unknown(table, KINDS, where)
     out = {}
     for kind in kinds:
         own = as_table(table.get(kind, {}), f"{where}.{kind}")
         refuse_unknown(own, RANGES[kind], f"{where}.{kind}")
-        out[kind] = dict(RANGES[kind])
+        out[kind] = dict(default[kind])
         for key, both in own.items():
             if not isinstance(both, list) or len(both) != 2:
                 raise InputError(f"{where}.{kind}: {key} must be [low, high]")
