@@ -39,7 +39,7 @@ class CellData:
     about: dict
     # ---- cases
     kind: np.ndarray = column("cases", (), "i1", "index into about['kinds']")
-    design: np.ndarray = column("cases", (), "i4", "number in the sample of its kind, from 0")
+    design: np.ndarray = column("cases", (), "i4", "number in the sample of its kind, from 0; edge designs from 100000")
     held_out: np.ndarray = column("cases", (), "?", "for judging only")
     mesh: np.ndarray = column("cases", (), "i1", "index into about['meshes']")
     shape: np.ndarray = column("cases", (13,), "f4", "about['shape']: angle in degrees, lengths in normal pitches")

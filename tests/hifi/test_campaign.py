@@ -10,7 +10,7 @@ from geometry.shape_numbers import SHAPE, shape_numbers
 from hifi.campaign_case import first_touch, prescribed_change
 from hifi.campaign_extension import taken_over
 from hifi.campaign_sample import RANGES, prescribed_states, segments
-from hifi.campaignfile import read_campaign
+from hifi.campaignfile import EDGES, read_campaign
 from reduced.choice import DATA_SET
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="nothing parallel in it")
@@ -27,6 +27,20 @@ def test_more_designs_keep_the_first_ones(tmp_path):
     assert len(few.designs) == 10 and {d.case.name for d in few.designs} < names and len(names) == 40
     assert {d.index for d in many.designs if d.held_out} == {2, 5, 8, 11, 14, 17}
     assert [d.index for d in many.designs] == sorted(d.index for d in many.designs)  # ended half way it is a smaller one
+
+
+def test_edge_designs_are_further_ones_that_lie_further_out_and_train_the_law(tmp_path):
+    plain = "designs = 6\nkinds = ['twisting']\nheld_out_every = 3\n"
+    few, many = (campaign(tmp_path, plain + f"edge_designs = {n}\n[edge_ranges.twisting]\nangle_deg = [30, 90]") for n in (3, 64))
+    ordinary = campaign(tmp_path, plain).designs
+    assert many.designs[:6] == ordinary and [d.index for d in many.designs[6:]] == [*range(EDGES, EDGES + 64)]
+    assert {d.case.name for d in few.designs} < {d.case.name for d in many.designs}
+    edges = many.designs[6:]
+    assert not any(d.held_out for d in edges)
+    for name, low, high in (("width", 8.0, 16.0), ("angle", 30.0, 90.0)):
+        places = np.array([(getattr(d.segment, name) - low) / (high - low) for d in edges])
+        # of Chebyshev's nodes a third lies in the middle half
+        assert ((places > 0.25) & (places < 0.75)).sum() == pytest.approx(64 / 3, abs=2)
 
 
 def test_prescribed_states_and_fine_meshes_are_for_some_designs(tmp_path):
@@ -116,6 +130,7 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
         ('[[mesh]]\nname = "a"\nmesh_size_mm = 2\nslopes = 1', "slopes = 1 must be true or false"),
         ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
         ("[ranges.one-sided]\nangle_deg = [10, 20]", "outside 30..150"),
+        ("[edge_ranges.one-sided]\nwalls_mm = [1, 2]", r"\[edge_ranges\].one-sided.*walls_mm"),
     ],
 )
 def test_a_slip_in_the_file_is_named(tmp_path, text, message):
