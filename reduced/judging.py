@@ -106,3 +106,13 @@ def finest_mesh(law, held_out):
         "finest_mesh_strain_median_rel": float(np.median(error)),
         "finest_mesh_strain_p95_rel": float(np.percentile(error, 95)),
     }
+
+
+def further_angles(found):
+    """{figure: number} of the free states of designs more slanted than the held-out ones; found: [(their numbers, `misses`)]."""
+    if not found:
+        return {}
+    of_all = figures([missed for _, missed in found])
+    kept = ("law_strain_median_rel", "law_strain_p95_rel", "law_tip100_p95_rel", "law_stiffness_p95_rel")
+    told = {key.replace("law_", "further_angles_"): of_all[key] for key in kept}
+    return {"further_angles_designs": sum(len(numbers) for numbers, _ in found)} | told

@@ -10,12 +10,13 @@ from base.errors import InputError
 from base.materials import NeoHookean, Yeoh
 from geometry.parameters import KINDS, ONE_SIDED, TWISTING
 from geometry.shape_numbers import SHAPE, direction_matrix, segment_of, shape_numbers
-from reduced.judging import stiffness_error
+from reduced.fit_law import fit_path, fit_stiffness
+from reduced.judging import further_angles, stiffness_error
 from reduced.law import RodLaw, read_law
 from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
 from reduced.states import sample_of
-from reduced.training import fit_path, fit_stiffness, run_training, samples_of
+from reduced.training import further_designs, judge_free_states_again, run_training, samples_of
 
 SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
@@ -168,6 +169,21 @@ def test_held_out_figures_of_an_easy_law_are_small_and_its_intervals_honest(trai
         assert figures["law_stiffness_p95_rel"] < 0.02 and figures["law_force_p95_rel"] < 0.05
         assert figures["force_in_other_directions_p95_rel"] < 0.05
         assert figures["law_interval_coverage_90"] > 0.7
+
+
+def test_designs_more_slanted_than_the_held_out_ones_are_judged_by_laws_that_have_not_seen_them(trained):
+    data = made_up_data()
+    training, held_out = samples_of(replace(data, held_out=data.held_out & (data.shape[:, 0] > 60)))[ONE_SIDED]
+    pairs = further_designs(training, held_out)
+    further = training.free.design[training.free.shape[:, 0] < held_out.free.shape[:, 0].min()]
+    assert np.array_equal(np.sort(np.concatenate([judged.designs for _, judged in pairs])), np.unique(further)) and len(pairs) == 5
+    for learned, judged in pairs:
+        assert np.array_equal(np.union1d(learned.designs, judged.designs), training.designs)
+        assert len(learned.designs) + len(judged.designs) == len(training.designs)
+    learned, judged = pairs[0]
+    told = further_angles([(judged.designs, judge_free_states_again(trained[0].kinds[ONE_SIDED], learned, judged))])
+    assert told["further_angles_designs"] == len(judged.designs) and 0 < told["further_angles_strain_p95_rel"] < 0.02
+    assert further_designs(*samples_of(data)[ONE_SIDED]) == [] and further_angles([]) == {}
 
 
 def test_it_says_when_it_is_asked_outside_and_by_how_much(trained):
