@@ -132,6 +132,7 @@ def parser():
 
     c = add("train", run_train, "the rod law from a data set of cells, with its errors on held-out designs")
     c.add_argument("data", type=Path, metavar="DATA.npz")
+    c.add_argument("--like", type=Path, metavar="LAW.npz", help="keep the metrics and noises of this law: for data that have grown")
     c.add_argument("--no-comparison", action="store_true", help="leave out the other laws and the learning curve")
     c.add_argument(
         "-o", "--output", type=Path, metavar="LAW.npz", help="default: law.npz beside the data; tables get the same name with .md"
@@ -223,7 +224,7 @@ def run_train(a):
 
     with rank_map() as mapping:
         if mapping:  # other ranks have worked for this one
-            run_training(a.data, a.output or a.data.with_name("law.npz"), say, not a.no_comparison, mapping)
+            run_training(a.data, a.output or a.data.with_name("law.npz"), say, not a.no_comparison, mapping, a.like)
 
 
 def run_report(a):

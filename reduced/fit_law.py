@@ -146,11 +146,12 @@ def _fit_smooth(states, like, again):
     return gaussian.fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, like, again=again)
 
 
-def fit_kind(sample, like=None):
-    """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts."""
+def fit_kind(sample, like=None, again=True):
+    """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts, or, unless `again`, which
+    are taken as they are."""
     states, around = sample.free, sample.around
-    path = fit_path(states, like and like.path, again=True)
-    stiffness = fit_stiffness(states, like and like.stiffness, again=True)
+    path = fit_path(states, like and like.path, again=again)
+    stiffness = fit_stiffness(states, like and like.stiffness, again=again)
     co = Coordinates(states.kind)
     closed = stiffness.closed(around.shape, around.pressure, around.strains)
     x = co.around_inputs(around.shape, around.strains, closed)

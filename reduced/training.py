@@ -17,7 +17,7 @@ from base.files import write_text
 from reduced.comparing import compare_laws, curve_table, law_table, learning_curve
 from reduced.fit_law import FOLDS, fit_kind, fit_path, fit_stiffness
 from reduced.judging import figures, finest_mesh, further_angles, misses
-from reduced.law import RodLaw, write_law
+from reduced.law import RodLaw, read_law, write_law
 from reduced.law_coordinates import cosine
 from reduced.states import folds, sample_of, splits
 
@@ -50,17 +50,19 @@ def digest(path):
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
-def run_training(path, out, say=print, compare=True, mapping=map):
+def run_training(path, out, say=print, compare=True, mapping=map, like=None):
     """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables. Returns the RodLaw.
 
-    mapping: a `map`, over processes for instance; what it computes side by side does not depend on how many there are.
+    mapping: a `map`, over processes for instance; what it computes side by side does not depend on how many there are. like: file of a
+    law whose metrics and noises are taken as they are.
     """
     data, started = read_dataset(path), time.perf_counter()
+    known, about = (read_law(like).kinds, {"like_sha256": digest(like)}) if like else ({}, {})
     try:
         samples = samples_of(data, say)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    jobs = [(fit_kind, (training,)) for training, _ in samples.values()]
+    jobs = [(fit_kind, (training, known.get(kind), False)) for kind, (training, _) in samples.items()]
     if compare:
         jobs += [(job, pair) for pair in samples.values() for job in (compare_laws, learning_curve)]
     done = list(_shown(mapping(_do, jobs), len(jobs), "trained", say))
@@ -73,7 +75,7 @@ def run_training(path, out, say=print, compare=True, mapping=map):
         if compare:
             compared[kind] = {"laws": next(tables), "learning curve": next(tables)}
             lines += [*law_table(compared[kind]["laws"]), *curve_table(compared[kind]["learning curve"])]
-    about = {"data": Path(path).name, "data_sha256": digest(path), "revisions": data.about["revisions"]}
+    about |= {"data": Path(path).name, "data_sha256": digest(path), "revisions": data.about["revisions"]}
     law = RodLaw(laws, about | {"figures": judged, "held_out": held_out, "compared": compared})
     write_law(out, law)
     write_text(Path(out).with_suffix(".md"), "\n".join(lines) + "\n")

@@ -234,6 +234,17 @@ def test_a_file_gives_the_same_law(trained):
     assert "law_strain_p95_rel" in (folder / "law.md").read_text()
 
 
+def test_on_the_same_data_the_metrics_of_a_law_give_it_again(trained):
+    law, folder = trained
+    settings = {"say": lambda text: None, "compare": False, "like": folder / "law.npz"}
+    again = run_training(folder / "cells.npz", folder / "again.npz", **settings)
+    for kind in KINDS:
+        segment = design(kind)
+        assert again.of(segment).free_strains(0.05) == pytest.approx(law.of(segment).free_strains(0.05), rel=1e-9, abs=1e-12)
+        assert again.kinds[kind].quantile == pytest.approx(law.kinds[kind].quantile, rel=1e-6)
+    assert "like_sha256" in again.about and "like_sha256" not in law.about
+
+
 def test_how_far_walls_close_is_known_up_to_the_first_state_in_touch():
     data = made_up_data()
     first = np.full(len(data.kind), np.nan)
