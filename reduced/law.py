@@ -28,6 +28,8 @@ SCHEMA = "pneunet-law-5"
 TIE_TOLERANCE = 0.02
 #: `make bench ONLY=silicones`, docs/rod-law.md
 SILICONES = "strains of fitted silicones differed by up to 1.2 % at P/mu = 0.1 and 7.3 % at 0.2"
+#: of an input's range, by which dimensions may leave it that `pneunet design` has put on its edge and rounded
+ROUNDED = 1e-3
 #: lowest P/mu, whose logarithm is taken
 LOWEST = 1e-9
 
@@ -189,8 +191,8 @@ class SectionLaw:
         known = np.sort([co.told(law.low), co.told(law.high)], axis=0).T
         reasons = [
             f"{name} = {value:.3g} is outside the trained law's {low:.3g} to {high:.3g}"
-            for name, value, (low, high), out in zip(co.names, told, known, excess.max(axis=0) > 0)
-            if out
+            for name, value, (low, high), out in zip(co.names, told, known, excess.max(axis=0))
+            if out > ROUNDED
         ]
         if excess[:, -2].max() > 0 and not reasons:
             reasons = ["the trained law knows no design near this one"]
