@@ -23,9 +23,12 @@ def taken_over(campaign, path):
     data = read_dataset(path)
     about = data.about
     theirs = {**about["campaign"], "ranges": about["ranges"]}
-    for key, value in json.loads(json.dumps({**campaign.table, "ranges": campaign.ranges})).items():
-        if not key.endswith("designs") and theirs.get(key, value) != value:
-            raise InputError(f"{path}: its sample has {key} = {theirs[key]}, the campaign's {value}: extend it with the same")
+    asked = {**campaign.table, "ranges": campaign.ranges}
+    for free in ("designs", "edge_designs", *(() if theirs.get("edge_designs") else ("edge_ranges",))):
+        asked.pop(free)
+    for key, value in json.loads(json.dumps(asked)).items():
+        if theirs.get(key) != value:
+            raise InputError(f"{path}: its sample has {key} = {theirs.get(key)}, the campaign's {value}: extend it with the same")
     meshes, cases = {mesh["name"]: mesh for mesh in about["meshes"]}, {}
     places = zip(data.kind.tolist(), data.design.tolist(), data.mesh.tolist())
     rows = {(about["kinds"][k], d, about["meshes"][m]["name"]): row for row, (k, d, m) in enumerate(places)}

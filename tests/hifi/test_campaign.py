@@ -114,6 +114,8 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
     """(That one of the same sample can is in tests/pneunet/test_campaign.py.)"""
     like = "seed = 1\n[[mesh]]\nname = 'coarse'\nmesh_size_mm = "
     assert len(taken_over(campaign(tmp_path, like + "2.0"), DATA_SET).cases) > 200
+    edges = "edge_designs = 2\n" + like + "2.0\n[edge_ranges.twisting]\nangle_deg = [30, 90]"
+    assert len(taken_over(campaign(tmp_path, edges), DATA_SET).cases) > 200  # it has none of those, so theirs may lie anywhere
     with pytest.raises(InputError, match="its mesh is .*extend it with the same"):
         taken_over(campaign(tmp_path, like + "3.0"), DATA_SET)
     with pytest.raises(InputError, match="seed = 1, the campaign's 2: extend it with the same"):
