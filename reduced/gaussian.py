@@ -90,14 +90,19 @@ class GaussianProcess:
     slope_noise: float
 
     @cached_property
+    def _square_metric(self):
+        """(d, d): the same distances as the metric's, in as few numbers as can be."""
+        return qr(self.metric.T, mode="r")[0][: len(self.metric)].T
+
+    @cached_property
     def points(self):
-        """(m, e) inducing points, where distances are the kernel's."""
-        return self.inducing @ self.metric
+        """(m, d) inducing points, where distances are the kernel's."""
+        return self.inducing @ self._square_metric
 
     @cached_property
     def to_kernel(self):
-        """(d, e): inputs less `shift` times it are where distances are the kernel's."""
-        return self.metric / self.width[:, None]
+        """(d, d): inputs less `shift` times it are where distances are the kernel's."""
+        return self._square_metric / self.width[:, None]
 
     @cached_property
     def plane(self):
@@ -114,7 +119,7 @@ class GaussianProcess:
         return (self.weights[: len(self.points), :, None] * self.points[:, None, :]).reshape(len(self.points), -1)
 
     def exponent(self, a):
-        """(n, m) logarithms of the kernels at the inducing points, of inputs a (n, e) in the same space."""
+        """(n, m) logarithms of the kernels at the inducing points, of inputs a (n, d) in the same space."""
         return _exponent(a, *self._columns)
 
     @cached_property
@@ -150,7 +155,7 @@ class GaussianProcess:
     def deviation(self, x):
         """(n, p) standard deviation of the outputs, without noise."""
         z = (x - self.shift) / self.width
-        kernel = _kernel(z @ self.metric, self.points)
+        kernel = _kernel(z @ self._square_metric, self.points)
         basis = np.hstack([kernel, np.ones((len(x), 1)), z])
         missed = 1 - (solve_triangular(self._kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
         known = self.noise * (solve_triangular(self._root, basis.T, trans="T") ** 2).sum(axis=0)
