@@ -27,11 +27,13 @@ def remeshed():
     from reduced.states import sample_of
 
     campaign = read_campaign(CAMPAIGN)
-    other = {"mesh": {"mesh_size_mm": MESH_SIZE}, "prescribed": []}
-    held_out = [d for d in campaign.designs if d.held_out and d.mesh is campaign.meshes[0] and d.index < BELOW]
-    designs = tuple(replace(d, case=replace(d.case, inputs=d.case.inputs | other)) for d in held_out)
+    coarse = campaign.meshes[0]
+    mesh = replace(coarse, settings={"mesh_size_mm": MESH_SIZE})
+    held_out = [d for d in campaign.designs if d.held_out and d.mesh is coarse and d.index < BELOW]
+    other = {"mesh": mesh.settings, "prescribed": []}
+    designs = tuple(replace(d, mesh=mesh, case=replace(d.case, inputs=d.case.inputs | other)) for d in held_out)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    gathering = Gathering(replace(campaign, designs=designs), FOLDER, Known())
+    gathering = Gathering(replace(campaign, designs=designs, meshes=(mesh,)), FOLDER, Known())
     run_cases([d.case for d in designs], FOLDER / "cases", campaign.limits, on_record=gathering.add)
     data, again, laws, details = read_dataset(DATA_SET), gathering.data(), read_law(SHIPPED).kinds, {}
     for kind in again.about["kinds"]:

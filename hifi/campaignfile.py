@@ -94,19 +94,22 @@ def read_campaign(path):
     limits = as_table(data.get("limits", {}), f"{where} [limits]")
     refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
     designs, places = [], max(m.prescribed for m in meshes)
+    # (name of the ranges, those, number of designs, index of the first, seed, whether they are edge designs)
+    sequences = (("ranges", ranges, count, 0, seed, False), ("edge_ranges", edge_ranges, edges, EDGES, seed + EDGE_SEED, True))
     for kind in kinds:
-        held_out = [is_held_out(index, held_out_every) for index in range(count)] + [False] * edges
-        prescribed = prescribed_states(kind, count, places, seed) + prescribed_states(kind, edges, places, seed + EDGE_SEED)
-        try:
-            bodies = segments(kind, ranges[kind], count, seed) + segments(kind, edge_ranges[kind], edges, seed + EDGE_SEED, at_edges=True)
-        except InputError as error:
-            raise InputError(f"{where} [ranges.{kind}]: they hold impossible bodies: {error}") from None
-        for index, segment, judge, states in zip([*range(count), *range(EDGES, EDGES + edges)], bodies, held_out, prescribed):
-            for mesh in meshes:
-                if index % mesh.every == 0:
-                    settings = common | {"slopes": mesh.slopes and not judge}
-                    case = _case(kind, index, mesh, segment, states[: mesh.prescribed_of(index)], settings)
-                    designs.append(Design(kind, index, mesh, judge, segment, case))
+        for name, box, size, first, start, at_edges in sequences:
+            try:
+                bodies = segments(kind, box[kind], size, start, at_edges)
+            except InputError as error:
+                raise InputError(f"{where} [{name}.{kind}]: they hold impossible bodies: {error}") from None
+            states = prescribed_states(kind, size, places, start)
+            for index, (segment, prescribed) in enumerate(zip(bodies, states), start=first):
+                judge = not at_edges and is_held_out(index, held_out_every)
+                for mesh in meshes:
+                    if index % mesh.every == 0:
+                        settings = common | {"slopes": mesh.slopes and not judge}
+                        case = _case(kind, index, mesh, segment, prescribed[: mesh.prescribed_of(index)], settings)
+                        designs.append(Design(kind, index, mesh, judge, segment, case))
     designs.sort(key=lambda d: d.index)
     table = {"designs": count, "edge_designs": edges, "seed": seed, "held_out_every": held_out_every, **common}
     table["edge_ranges"] = {k: {name: r for name, r in edge_ranges[k].items() if r != ranges[k][name]} for k in kinds}

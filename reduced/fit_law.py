@@ -93,6 +93,8 @@ def fit_path(states, like=None, again=False, slopes=True):
 
 
 def fit_strains(states, good, x, y, slopes=None, like=None, again=False):
+    """SideBySide processes of Coordinates.learned_strains y (n, p) at inputs x (n, d) of the States that are `good` (n,), the leading
+    strain's first; slopes: gaussian.Slopes at those; like, again: as for gaussian.fit."""
     trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.shape)))
     settings = {"slopes": slopes, "like": like, "again": again, "inducing": INDUCING}
     return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), **settings)

@@ -111,7 +111,7 @@ class GaussianProcess:
 
     @cached_property
     def _columns(self):
-        """(e, m) the points once more, as a product with a few rows is fastest; and half of their squares."""
+        """The points once more (d, m), as a product with a few rows is fastest, and half of their squares (m,)."""
         return np.ascontiguousarray(self.points.T), _half_squares(self.points)
 
     @cached_property
