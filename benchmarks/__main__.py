@@ -184,6 +184,9 @@ def snapshot():
     if "law" in meta:
         page = ROOT / "docs" / "rod-law.md"
         write_text(page, law.page(page.read_text(), meta["law"]["details"], meta))
+    if "rod-fe" in meta:
+        page = ROOT / "docs" / "theory-reduced.md"
+        write_text(page, rod.page(page.read_text(), meta["rod-fe"]["details"]))
     if "contact" in meta:
         page = ROOT / "docs" / "contact.md"
         write_text(page, contact_page.page(page.read_text(), results, meta["contact"]["details"]))

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.tables import below_mark, table
+
 PRESSURE = 0.02
 MESH_SIZE = 1.0
 SHARES = (0.4, 1.0)  # of the top pressure at which shapes are compared
@@ -121,3 +123,15 @@ def against_finite_elements():
         "rod_vs_fe_rms_rel_max_trained": max(r["rms_trained"] for r in rows),
     }
     return figures, {"mesh_size_mm": MESH_SIZE, "rows": rows}
+
+
+def page(text, details):
+    """docs/theory-reduced.md, of which `text` is the present one, with the table below its mark made anew."""
+
+    def percent(row, which):
+        return f"{100 * row['tip' + which]:.1f}; {100 * row['rms' + which]:.1f}"
+
+    ways = {"with end effects": "", "without": "_without", "trained law": "_trained"}
+    rows = [(r["case"], f"{r['pressure_kPa']:.0f}", *[percent(r, way) for way in ways.values()]) for r in details["rows"]]
+    units = f"Distances in % of the length: tip; RMS of the section frames. h = {details['mesh_size_mm']:g} mm."
+    return below_mark(text, "rod-fe", ["## Rods against finite elements", "", units, "", *table(["case", "kPa", *ways], rows)])
