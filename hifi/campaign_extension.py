@@ -24,7 +24,7 @@ def taken_over(campaign, path):
     about = data.about
     theirs = {**about["campaign"], "ranges": about["ranges"]}
     asked = {**campaign.table, "ranges": campaign.ranges}
-    del asked["designs"], asked["edge_designs"]  # may grow
+    del asked["designs"], asked["edge_designs"], asked["further"]  # may grow
     if not theirs.get("edge_designs"):
         del asked["edge_ranges"]
     for key, value in json.loads(json.dumps(asked)).items():

@@ -17,13 +17,13 @@ DEFAULT_TIME = 3600.0
 #: index of the first edge design, and what their seed is more: both sequences can be extended
 EDGES, EDGE_SEED = 100_000, 200
 KEYS = ("kinds", "designs", "edge_designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share")
-KEYS += ("mesh", "ranges", "edge_ranges", "limits")
+KEYS += ("further", "mesh", "ranges", "edge_ranges", "limits")
 
 
 @dataclass(frozen=True)
 class Mesh:
     """What geometry.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th designs, from the first, are
-    computed on it.
+    computed on it, and further ones where it is 1.
 
     prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free states of designs that
     are not held out are differentiated by the shape.
@@ -93,29 +93,43 @@ def read_campaign(path):
     edge_ranges = _ranges(data, "edge_ranges", kinds, where, ranges)
     limits = as_table(data.get("limits", {}), f"{where} [limits]")
     refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
+    further = _further(data, kinds, count, where)
     designs, places = [], max(m.prescribed for m in meshes)
-    # (name of the ranges, those, number of designs, index of the first, seed, whether they are edge designs)
-    sequences = (("ranges", ranges, count, 0, seed, False), ("edge_ranges", edge_ranges, edges, EDGES, seed + EDGE_SEED, True))
     for kind in kinds:
-        for name, box, size, first, start, at_edges in sequences:
+        # (name of the ranges, those, places in the sequence, index of the first, seed, whether they are edge designs)
+        own = [*range(count), *further[kind]]
+        sequences = (("ranges", ranges, own, 0, seed, False), ("edge_ranges", edge_ranges, range(edges), EDGES, seed + EDGE_SEED, True))
+        for name, box, positions, first, start, at_edges in sequences:
+            size = max(positions, default=-1) + 1
             try:
                 bodies = segments(kind, box[kind], size, start, at_edges)
             except InputError as error:
                 raise InputError(f"{where} [{name}.{kind}]: they hold impossible bodies: {error}") from None
             states = prescribed_states(kind, size, places, start)
-            for index, (segment, prescribed) in enumerate(zip(bodies, states), start=first):
+            for position in positions:
+                index = first + position
                 judge = not at_edges and is_held_out(index, held_out_every)
                 for mesh in meshes:
-                    if index % mesh.every == 0:
+                    if mesh.every == 1 or index % mesh.every == 0 and (at_edges or index < count):
                         settings = common | {"slopes": mesh.slopes and not judge}
-                        case = _case(kind, index, mesh, segment, prescribed[: mesh.prescribed_of(index)], settings)
-                        designs.append(Design(kind, index, mesh, judge, segment, case))
+                        case = _case(kind, index, mesh, bodies[position], states[position][: mesh.prescribed_of(index)], settings)
+                        designs.append(Design(kind, index, mesh, judge, bodies[position], case))
     designs.sort(key=lambda d: d.index)
     table = {"designs": count, "edge_designs": edges, "seed": seed, "held_out_every": held_out_every, **common}
+    table["further"] = {kind: len(indices) for kind, indices in further.items()}
     table["edge_ranges"] = {k: {name: r for name, r in edge_ranges[k].items() if r != ranges[k][name]} for k in kinds}
     return Campaign(
         tuple(designs), tuple(kinds), meshes, ranges, Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")), table
     )
+
+
+def on_offer(campaign, kind, count):
+    """[(index, Segment)] of the next `count` designs of the sample after a Campaign's that could be further ones: neither held out nor
+    among its own."""
+    start, known = campaign.table["designs"], {d.index for d in campaign.designs if d.kind == kind}
+    bodies = segments(kind, campaign.ranges[kind], start + count, campaign.table["seed"])
+    free = (i for i in range(start, start + count) if i not in known and not is_held_out(i, campaign.table["held_out_every"]))
+    return [(i, bodies[i]) for i in free]
 
 
 def is_held_out(index, every):
@@ -163,6 +177,18 @@ def _meshes(rows, where):
     if len({m.name for m in meshes}) < len(meshes):
         raise InputError(f"{where}: two [[mesh]] have the same name")
     return tuple(meshes)
+
+
+def _further(data, kinds, count, where):
+    """{kind: indices} of [further], designs of the sample beyond the first `count`."""
+    where = f"{where} [further]"
+    table = as_table(data.get("further", {}), where)
+    refuse_unknown(table, kinds, where)
+    for kind, indices in table.items():
+        whole = isinstance(indices, list) and all(isinstance(i, int) and not isinstance(i, bool) for i in indices)
+        if not whole or len(set(indices)) < len(indices) or any(not count <= i < EDGES for i in indices):
+            raise InputError(f"{where}: {kind} must be a list of different whole numbers in {count}..{EDGES - 1}")
+    return {kind: table.get(kind, []) for kind in kinds}
 
 
 def _ranges(data, name, kinds, where, default):

@@ -57,6 +57,12 @@ def mesh_size(text):
     return value
 
 
+def whole(text):
+    if not text.isdecimal() or not 0 < int(text) <= 20_000:
+        raise argparse.ArgumentTypeError(f"'{text}' must be a whole number in 1..20000")
+    return int(text)
+
+
 def strain_percent(text):
     try:
         value = float(text)
@@ -129,6 +135,14 @@ def parser():
     c.add_argument("--extend", type=Path, metavar="DATA.npz", help="a data set whose cases are taken over, not computed again")
     c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the campaign; finished cases there are kept")
+
+    c = add("suggest", run_suggest, "further designs for a campaign: those that would teach the rod law most")
+    c.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml")
+    c.add_argument("--kind", choices=("one-sided", "twisting"), required=True)
+    c.add_argument("-n", "--number", type=whole, default=100, metavar="100", help="how many; default: 100")
+    c.add_argument("--of", type=whole, default=2000, metavar="2000", help="of how many designs that follow in the sample; default: 2000")
+    c.add_argument("--touching", action="store_true", help="by the bending stiffness of cells whose walls touch, not by the free strains")
+    c.add_argument("--law", default="trained", metavar="LAW.npz", help="of pneunet train; default: the one that comes along")
 
     c = add("train", run_train, "the rod law from a data set of cells, with its errors on held-out designs")
     c.add_argument("data", type=Path, metavar="DATA.npz")
@@ -217,6 +231,25 @@ def run_campaign(a):
     from hifi.campaign import run_campaign as work
 
     work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry, extend=a.extend)
+
+
+def run_suggest(a):
+    import numpy as np
+
+    from geometry.shape_numbers import shape_numbers
+    from hifi.campaignfile import on_offer, read_campaign
+    from reduced.choice import choose_law
+    from reduced.suggestion import most_telling
+
+    campaign, law = read_campaign(a.campaign), choose_law(a.law)
+    known = getattr(law, "kinds", {})
+    if a.kind not in known or a.kind not in campaign.kinds:
+        raise InputError(f"--kind {a.kind}: {a.campaign if a.kind in known else f'--law {a.law}'} does not know it")
+    offered = on_offer(campaign, a.kind, a.of)
+    shape = np.array([shape_numbers(segment) for _, segment in offered])
+    top, share = (campaign.table[key] for key in ("top_pressure", "limit_share"))
+    rows = most_telling(known[a.kind], shape, a.number, top, share, a.touching)
+    say(f"[further]\n{a.kind} = {sorted(offered[row][0] for row in rows)}")
 
 
 def run_train(a):

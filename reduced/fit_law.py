@@ -13,6 +13,7 @@ from reduced.judging import symmetric
 from reduced.law import LOWEST, KindLaw
 from reduced.law_coordinates import Coordinates, cosine, odd
 from reduced.potential import fit_anharmonic
+from reduced.side_by_side import fit_side_by_side
 from reduced.states import folds
 
 #: of the cross-validation that intervals come from
@@ -88,7 +89,7 @@ def fit_path(states, like=None, again=False, slopes=True):
         steep = slopes_of(states, known, inputs, outputs, good)
         steep = steep.of((np.abs(in_deviations(steep, x[good])) < STEEPEST).all(axis=1))
     learned = fit_strains(states, good, x, y, steep, like and like.learned, again)
-    start = gaussian.fit_side_by_side(states.inputs[good], -y[good, :1], states.case[good], np.ones((good.sum(), 1)), (1,), inducing=ROUGH)
+    start = fit_side_by_side(states.inputs[good], -y[good, :1], states.case[good], np.ones((good.sum(), 1)), (1,), inducing=ROUGH)
     return FreePath(states.kind, learned, start, FURTHEST * float(co.leading(states.strains).max()))
 
 
@@ -97,7 +98,7 @@ def fit_strains(states, good, x, y, slopes=None, like=None, again=False):
     strain's first; slopes: gaussian.Slopes at those; like, again: as for gaussian.fit."""
     trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.shape)))
     settings = {"slopes": slopes, "like": like, "again": again, "inducing": INDUCING}
-    return gaussian.fit_side_by_side(x[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), **settings)
+    return fit_side_by_side(x[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), **settings)
 
 
 def fit_closing(states, like=None, again=False):
@@ -105,7 +106,7 @@ def fit_closing(states, like=None, again=False):
     states = states.of(np.isfinite(states.closing))
     co = Coordinates(states.kind)
     x, y = co.closing_inputs(states.shape, co.closing_load(states.pressure, states.strains)), states.closing[:, None]
-    return gaussian.fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), like=like, again=again, most=MANY)
+    return fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), like=like, again=again, most=MANY)
 
 
 def fit_stiffness(states, like=None, again=False):
@@ -122,7 +123,7 @@ def fit_stiffness(states, like=None, again=False):
     added = (y - smooth(co.stiffness_inputs(states.shape, states.strains, states.level)))[:, order(co)]
     trust, x = _trust_in_stiffness(states)[:, order(co)], co.contact_inputs(states.shape, states.strains, closed)
     settings = {"like": like and like.contact, "again": again, "noises": CONTACT_NOISES}
-    contact = gaussian.fit_side_by_side(x, added, states.case, trust, (1, added.shape[1] - 1), **settings)
+    contact = fit_side_by_side(x, added, states.case, trust, (1, added.shape[1] - 1), **settings)
     return FreeStiffness(states.kind, closing, smooth, contact)
 
 
@@ -145,7 +146,7 @@ def _fit_smooth(states, like, again):
     known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states) & ~states.touching[:, None]
     steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
     steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
-    return gaussian.fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, like, again=again)
+    return fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, like, again=again)
 
 
 def fit_kind(sample, like=None, again=True):

@@ -13,8 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from reduced.along_input import AlongInput
-from reduced.gaussian import ROWS, SideBySide
+from reduced.gaussian import ROWS
 from reduced.law_coordinates import LEADING, SMALL_STRAIN, Coordinates, cosine, odd
+from reduced.side_by_side import SideBySide
 
 #: steps over the slope that end the search, of log(leading strain): what is left after them is of third order (measured: at most 5e-5
 #: in the leading strain, a hundredth of the law's error); the longest; how many

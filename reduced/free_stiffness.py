@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from reduced.gaussian import SideBySide
 from reduced.law_coordinates import GAP, SMALLEST, TINY, Coordinates
+from reduced.side_by_side import SideBySide
 
 
 @dataclass(frozen=True)

@@ -154,42 +154,23 @@ class GaussianProcess:
 
     def deviation(self, x):
         """(n, p) standard deviation of the outputs, without noise."""
+        _, explained, known = self._unknown(x)
+        missed = np.maximum(1 - (explained**2).sum(axis=0), 0)
+        return np.sqrt((self.noise * (known**2).sum(axis=0) + missed)[:, None] * self.variance)
+
+    def covariance(self, x):
+        """(n, n) covariance of an output at inputs (n, d) over its prior variance, without noise."""
+        a, explained, known = self._unknown(x)
+        return _kernel(a, a) - explained.T @ explained + self.noise * known.T @ known
+
+    def _unknown(self, x):
+        """Inputs where distances are the kernel's, and roots (., n): of the prior that inducing points explain, of what is left there."""
         z = (x - self.shift) / self.width
-        kernel = _kernel(z @ self._square_metric, self.points)
+        a = z @ self._square_metric
+        kernel = _kernel(a, self.points)
         basis = np.hstack([kernel, np.ones((len(x), 1)), z])
-        missed = 1 - (solve_triangular(self._kernel_root, kernel.T, lower=True) ** 2).sum(axis=0)
-        known = self.noise * (solve_triangular(self._root, basis.T, trans="T") ** 2).sum(axis=0)
-        return np.sqrt((known + np.maximum(missed, 0))[:, None] * self.variance)
-
-
-@dataclass(frozen=True)
-class SideBySide:
-    """Gaussian processes of consecutive outputs, each with metric and noise of its own, as one."""
-
-    processes: tuple
-
-    def __call__(self, x, derivative=False):
-        found = [process(x, derivative) for process in self.processes]
-        if not derivative:
-            return np.concatenate(found, axis=1)
-        return tuple(np.concatenate(part, axis=1) for part in zip(*found))
-
-    def rest(self, x):
-        """All but the first process."""
-        return np.concatenate([process(x) for process in self.processes[1:]], axis=1)
-
-    def deviation(self, x):
-        return np.concatenate([process.deviation(x) for process in self.processes], axis=1)
-
-
-def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, **settings):
-    """SideBySide processes of `widths` outputs each; the rest as for `fit`."""
-    ends = np.cumsum([0, *widths])
-    likes = like.processes if like else [None] * len(widths)
-    slopes = slopes or no_slopes(x.shape[1], y.shape[1])
-    parts = [slice(*both) for both in zip(ends, ends[1:])]
-    found = [fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, **settings) for c, known in zip(parts, likes)]
-    return SideBySide(tuple(found))
+        explained = solve_triangular(self._kernel_root, kernel.T, lower=True)
+        return a, explained, solve_triangular(self._root, basis.T, trans="T")
 
 
 def _half_squares(a):

@@ -18,10 +18,11 @@ from geometry.parameters import TWISTING
 from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
 from reduced.free_path import FreePath
 from reduced.free_stiffness import FreeStiffness
-from reduced.gaussian import GaussianProcess, SideBySide
+from reduced.gaussian import GaussianProcess
 from reduced.law_coordinates import LENGTHS, Coordinates, cosine
 from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, anharmonic_gradient, anharmonic_hessian, anharmonic_value, whitening
+from reduced.side_by_side import SideBySide
 
 SCHEMA = "pneunet-law-5"
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so

@@ -10,7 +10,7 @@ from geometry.shape_numbers import SHAPE, shape_numbers
 from hifi.campaign_case import first_touch, prescribed_change
 from hifi.campaign_extension import taken_over
 from hifi.campaign_sample import RANGES, prescribed_states, segments
-from hifi.campaignfile import EDGES, read_campaign
+from hifi.campaignfile import EDGES, on_offer, read_campaign
 from reduced.choice import DATA_SET
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="nothing parallel in it")
@@ -41,6 +41,19 @@ def test_edge_designs_are_further_ones_that_lie_further_out_and_train_the_law(tm
         places = np.array([(getattr(d.segment, name) - low) / (high - low) for d in edges])
         # of Chebyshev's nodes a third lies in the middle half
         assert ((places > 0.25) & (places < 0.75)).sum() == pytest.approx(64 / 3, abs=2)
+
+
+def test_further_designs_are_those_of_a_larger_sample_and_on_offer_is_what_they_may_be(tmp_path):
+    plain = "kinds = ['twisting']\nheld_out_every = 3\n"
+    meshes = "[[mesh]]\nname = 'coarse'\nmesh_size_mm = 2\n[[mesh]]\nname = 'fine'\nmesh_size_mm = 1\nevery = 7\n"
+    few = campaign(tmp_path, "designs = 2\n" + plain + meshes + "[further]\ntwisting = [9, 7]")
+    many = {(d.index, d.mesh.name): d for d in campaign(tmp_path, "designs = 12\n" + plain + meshes).designs}
+    # fine meshes are for every seventh of the first two
+    assert [(d.index, d.mesh.name) for d in few.designs] == [(0, "coarse"), (0, "fine"), (1, "coarse"), (7, "coarse"), (9, "coarse")]
+    assert all(d.case == many[d.index, d.mesh.name].case for d in few.designs)
+    offered = on_offer(few, "twisting", 10)
+    assert [index for index, _ in offered] == [3, 4, 6, 10]
+    assert offered[-1][1] == many[10, "coarse"].segment
 
 
 def test_prescribed_states_and_fine_meshes_are_for_some_designs(tmp_path):
@@ -114,6 +127,8 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
     """(That one of the same sample can is in tests/pneunet/test_campaign.py.)"""
     like = "seed = 1\n[[mesh]]\nname = 'coarse'\nmesh_size_mm = "
     assert len(taken_over(campaign(tmp_path, like + "2.0"), DATA_SET).cases) > 200
+    further = campaign(tmp_path, "designs = 3\n" + like + "2.0\n[further]\ntwisting = [300, 520]")
+    assert {d.index for d in further.designs if d.case.name in taken_over(further, DATA_SET).cases} == {0, 1, 2, 300}
     edges = "edge_designs = 2\n" + like + "2.0\n[edge_ranges.twisting]\nangle_deg = [30, 90]"
     assert len(taken_over(campaign(tmp_path, edges), DATA_SET).cases) > 200  # it has none of those, so theirs may lie anywhere
     with pytest.raises(InputError, match="its mesh is .*extend it with the same"):
@@ -133,6 +148,8 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
         ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
         ("[ranges.one-sided]\nangle_deg = [10, 20]", "outside 30..150"),
         ("edge_designs = 2\n[edge_ranges.twisting]\nangle_deg = [10, 20]", r"\[edge_ranges.twisting\].*outside 30..150"),
+        ("designs = 9\n[further]\ntwisting = [8, 12]", r"\[further\]: twisting must be a list of different whole numbers in 9.."),
+        ("[further]\nboth = [300]", r"\[further\].*both"),
         ("[edge_ranges.one-sided]\nwalls_mm = [1, 2]", r"\[edge_ranges\].one-sided.*walls_mm"),
     ],
 )

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from base.dataset import columns, read_dataset
+from hifi.campaignfile import read_campaign
+from pneunet.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 CAMPAIGN = """kinds = ["one-sided"]
@@ -59,3 +61,17 @@ def test_a_campaign_grows_and_its_states_are_those_of_one_potential(tmp_path):
             change = data.strains[i] - data.strains[start]
             mean = (data.matrices[i] + data.matrices[start]) / 2
             assert data.forces[i] == pytest.approx(mean @ change, abs=0.05 * float(np.linalg.norm(data.forces[i])))
+
+
+def test_designs_that_are_suggested_can_be_further_ones(tmp_path, capsys):
+    path = tmp_path / "c.toml"
+    path.write_text("designs = 3\nkinds = ['twisting']\n")
+    line = ["suggest", str(path), "--kind", "twisting", "--touching", "-n", "2", "--of", "50"]
+    assert main(line) == 0
+    lines = capsys.readouterr().out
+    path.write_text("designs = 3\nkinds = ['twisting']\n" + lines)
+    further = [d for d in read_campaign(path).designs if d.index >= 3]
+    assert len(further) == 2 and not any(d.held_out for d in further)
+    for more, message in ((["--law", "analytic"], "--law analytic does not know it"), (["--of", "3"], "on offer: offer more")):
+        assert main([*line, *more]) == 2
+        assert message in capsys.readouterr().err

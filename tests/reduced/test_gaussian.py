@@ -45,6 +45,19 @@ def test_with_all_points_it_is_the_textbook_s_process():
     assert process.deviation(inputs) ** 2 / process.variance == pytest.approx(np.column_stack([spread, spread]), rel=5e-3, abs=1e-6)
 
 
+def test_the_covariance_is_that_of_the_posterior():
+    x, y, group = observed(30)
+    found = fit(x, y, group)
+    process = fit(x, y, group, like=replace(found, metric=np.diag([1.0, 0.5]), noise=1e-3, common_noise=1e-2))
+    more = np.array([[0.3, -0.4], [0.9, 0.9], [-0.2, 0.7]])
+    before = process.covariance(more)
+    assert np.sqrt(np.diag(before)[:, None] * process.variance) == pytest.approx(process.deviation(more), rel=1e-6)
+    # what is not known after one more observation does not depend on what it says
+    after = fit(np.vstack([x, more[:1]]), np.vstack([y, [[5.0, -3.0]]]), np.append(group, 99), like=process).covariance(more)
+    told = np.outer(before[0], before[0]) / (before[0, 0] + process.noise + process.common_noise)
+    assert after == pytest.approx(before - told, rel=1e-3, abs=1e-6)
+
+
 def test_slopes_are_followed_and_spare_observations():
     x, y, group = observed(12)
     at, ways = np.arange(12), np.random.default_rng(3).normal(size=(12, 2))
