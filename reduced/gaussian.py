@@ -111,8 +111,7 @@ class GaussianProcess:
 
     @cached_property
     def _columns(self):
-        """The points once more (d, m), as a product with a few rows is fastest, and half of their squares (m,)."""
-        return np.ascontiguousarray(self.points.T), _half_squares(self.points)
+        return _columns(self.points)
 
     @cached_property
     def _weighed_points(self):
@@ -120,7 +119,7 @@ class GaussianProcess:
 
     def exponent(self, a):
         """(n, m) logarithms of the kernels at the inducing points, of inputs a (n, d) in the same space."""
-        return _exponent(a, *self._columns)
+        return _exponent(a, self._columns)
 
     @cached_property
     def _root(self):
@@ -177,16 +176,20 @@ def _half_squares(a):
     return np.add.reduce(a * a, axis=1) / 2
 
 
-def _exponent(a, columns, half):
-    """(n, m) -|a - b|^2/2 of a (n, e), b as columns (e, m) and half of its squares (m,)."""
-    k = a @ columns
-    k -= _half_squares(a)[:, None]
-    k -= half
-    return k
+def _columns(b):
+    """(e + 2, m) what `_exponent` takes of points b (m, e)."""
+    return np.vstack([b.T, -_half_squares(b), np.ones(len(b))])
+
+
+def _exponent(a, columns):
+    """(n, m) -|a - b|^2/2 of a (n, e) and the `_columns` of b (m, e), in one product."""
+    rows = np.empty((len(a), len(columns)))
+    rows[:, :-2], rows[:, -2], rows[:, -1] = a, 1.0, -_half_squares(a)
+    return rows @ columns
 
 
 def _kernel(a, b):
-    k = _exponent(a, b.T, _half_squares(b))
+    k = _exponent(a, _columns(b))
     return np.exp(k, out=k)
 
 
