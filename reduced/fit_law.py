@@ -25,7 +25,7 @@ MARGIN = 0.02
 #: points that the free states are summed up on, as many as 10,000 of them may cost in a quarter of a second; and those of the rough
 #: process that the search for the leading strain starts from: within some 3 % of it (measured: median), from where one step is
 #: mostly enough
-INDUCING, ROUGH = 1300, 300
+INDUCING, ROUGH = 1450, 300
 #: times the largest leading strain of the training designs: up to there paths of free states are followed
 FURTHEST = 1.2
 #: a deviation above this many times the largest one at the training points, rest included, is outside
@@ -166,15 +166,16 @@ def fit_kind(sample, like=None, again=True):
     low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
     low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
     law = KindLaw(states.kind, path, stiffness, anharmonic, np.ones(6), low, high, doubt, level)
-    return replace(law, quantile=_quantiles(law, states.loaded))
+    return replace(law, quantile=_quantiles(law, states.loaded, sample.drawn))
 
 
-def _quantiles(law, states):
-    """(6,) what deviations are multiplied by for INTERVAL of the cross-validated residuals to lie within."""
+def _quantiles(law, states, drawn):
+    """(6,) what deviations are multiplied by for INTERVAL of the cross-validated residuals to lie within. Those of designs that were
+    drawn like the held-out ones, with numbers below `drawn`: the chosen ones are harder, and would widen the intervals."""
     scores = []
-    for learned, judged in folds(np.unique(states.design), FOLDS):
-        path = fit_path(states.of(np.isin(states.design, learned)), like=law.path)
-        t = states.of(np.isin(states.design, judged))
+    for judged in folds(np.unique(states.design[states.design < drawn]), FOLDS):
+        out = np.isin(states.design, judged)
+        path, t = fit_path(states.of(~out), like=law.path), states.of(out)
         spread = path.spread(t.shape, t.pressure, t.level)
         miss = np.abs(path.strains(t.shape, t.pressure, t.level) - t.strains)
         scores.append(np.divide(miss, spread, out=np.zeros_like(miss), where=spread > 0))

@@ -60,29 +60,34 @@ class States:
 @dataclass(frozen=True)
 class Sample:
     """Cells of one kind: free States, and of those at prescribed strains the free state (`around`, States), the change (m, 6) of the
-    strains from there and the forces (m, 6)."""
+    strains from there and the forces (m, 6). Designs with a number below `drawn` are the sample's, as held-out ones are; others were
+    chosen."""
 
     free: States
     around: States
     change: np.ndarray
     forces: np.ndarray
+    drawn: float = np.inf
 
     def of(self, designs):
         """Those of the designs with these numbers."""
         held = np.isin(self.around.design, designs)
-        return Sample(self.free.of(np.isin(self.free.design, designs)), self.around.of(held), self.change[held], self.forces[held])
+        return self._with(self.free.of(np.isin(self.free.design, designs)), held)
 
     def on(self, level):
         """Those on one mesh."""
         held = self.around.level == level
-        return Sample(self.free.of(self.free.level == level), self.around.of(held), self.change[held], self.forces[held])
+        return self._with(self.free.of(self.free.level == level), held)
 
     def on_common_meshes(self):
         """Those on the coarsest mesh and on others that at least COMMON designs are computed on."""
         free, held = self.free, self.around
         rare = [level for level in np.unique(free.level) if level and len(np.unique(free.design[free.level == level])) < COMMON]
         kept = ~np.isin(held.level, rare)
-        return Sample(free.of(~np.isin(free.level, rare)), held.of(kept), self.change[kept], self.forces[kept])
+        return self._with(free.of(~np.isin(free.level, rare)), kept)
+
+    def _with(self, free, held):
+        return Sample(free, self.around.of(held), self.change[held], self.forces[held], self.drawn)
 
     @property
     def doubled(self):
@@ -124,7 +129,8 @@ def sample_of(data, kind, held_out):
     held = np.array([i for i in held if (data.case[i], round(float(data.pressure[i]), 6)) in at], int)
     where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)
     change = data.strains[held].astype(float) - states.strains[where]
-    return Sample(states, states.of(where), change, data.forces[held].astype(float))
+    drawn = data.about.get("campaign", {}).get("designs", np.inf)
+    return Sample(states, states.of(where), change, data.forces[held].astype(float), drawn)
 
 
 def _met(first_touch):
@@ -148,16 +154,16 @@ def _closing(data, rows, coordinates):
 
 
 def folds(designs, parts):
-    """Pairs (other numbers, numbers of one part) of designs, dealt out at random, the same for the same designs."""
+    """[numbers of one part] of designs, dealt out at random, the same for the same designs."""
     part = np.random.default_rng(0).permutation(len(designs)) % parts
-    for f in range(parts):
-        yield designs[part != f], designs[part == f]
+    return [designs[part == f] for f in range(parts)]
 
 
 def splits(training, held_out):
     """[(what a law learns from, what it is judged on)] of two Samples: as they are, and where the held-out designs are too few
-    also by PARTS of the training designs."""
+    also by PARTS of those training designs that were drawn as they were."""
     pairs = [(training, held_out)]
     if len(held_out.designs) < ENOUGH:
-        pairs += [(training.of(learned), training.of(judged)) for learned, judged in folds(training.designs, PARTS)]
+        every, drawn = training.designs, training.designs[training.designs < training.drawn]
+        pairs += [(training.of(np.setdiff1d(every, judged)), training.of(judged)) for judged in folds(drawn, PARTS)]
     return pairs

@@ -135,7 +135,7 @@ def further_designs(training, held_out):
     may be, in parts; [] where they are few."""
     slant, most = np.abs(cosine(training.free.shape)), np.abs(cosine(held_out.free.shape)).max()
     further = np.unique(training.free.design[slant > most])
-    parts = [part for _, part in folds(further, FURTHER_PARTS)] if len(further) >= 2 * FURTHER_PARTS else []
+    parts = folds(further, FURTHER_PARTS) if len(further) >= 2 * FURTHER_PARTS else []
     return [(training.of(np.setdiff1d(training.designs, part)), training.of(part)) for part in parts]
 
 

@@ -37,6 +37,12 @@ def test_few_held_out_designs_are_joined_by_every_training_design_once():
     assert len(splits(training, sample(np.arange(100, 100 + ENOUGH)))) == 1
 
 
+def test_designs_that_were_chosen_teach_and_do_not_judge():
+    _, *parts = splits(replace(sample(np.arange(37)), drawn=20), sample(np.arange(100, 110)))
+    assert sorted(np.concatenate([judged.designs for _, judged in parts])) == list(range(20))
+    assert all(set(learned.designs) == set(range(37)) - set(judged.designs) for learned, judged in parts)
+
+
 def test_a_mesh_of_few_designs_is_left_out():
     many = sample(np.arange(2 * COMMON))
     for fine, levels in ((COMMON - 1, {0}), (COMMON, {0, 1})):
