@@ -22,7 +22,7 @@ INTERVAL = 0.9
 #: the training designs' ranges are widened by this part before a design is outside
 MARGIN = 0.02
 
-#: points that the free states are summed up on, as many as 10,000 of them may cost in a quarter of a second; and those of the rough
+#: points that the free states are summed up on, as many as a rod of both kinds may cost in half a millisecond; and those of the rough
 #: process that the search for the leading strain starts from: within some 3 % of it (measured: median), from where one step is
 #: mostly enough
 INDUCING, ROUGH = 1450, 300

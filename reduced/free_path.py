@@ -18,7 +18,8 @@ from reduced.law_coordinates import LEADING, SMALL_STRAIN, Coordinates, cosine, 
 from reduced.side_by_side import SideBySide
 
 #: steps over the slope that end the search, of log(leading strain): what is left after them is of third order (measured: at most 5e-5
-#: in the leading strain, a hundredth of the law's error); the longest; how many
+#: in the leading strain, a hundredth of the law's error); the longest; how many. (Slopes next
+#: to a limit load count as FLAT there: at most 4e-6.)
 NEAR, LONGEST, MOST = 0.07, 0.7, 20
 #: of d log P/d log(leading strain), from there on next to a limit load: derivatives and deviations are no larger than there
 FLAT = 0.02
@@ -70,7 +71,7 @@ class FreePath:
             step = np.minimum(_euler(missing, slope, curvature), last - v)
             v = v + step
             found[searched], beyond[searched] = v, missing * ((slope < FLAT) | (v >= last))
-            far = np.abs(step) > NEAR * slope
+            far = np.abs(step) > NEAR * np.maximum(slope, FLAT)
             if not far.any():
                 break
             if not far.all():

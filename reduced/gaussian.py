@@ -172,19 +172,16 @@ class GaussianProcess:
         return a, explained, solve_triangular(self._root, basis.T, trans="T")
 
 
-def _half_squares(a):
-    return np.add.reduce(a * a, axis=1) / 2
-
-
 def _columns(b):
     """(e + 2, m) what `_exponent` takes of points b (m, e)."""
-    return np.vstack([b.T, -_half_squares(b), np.ones(len(b))])
+    return np.vstack([b.T, (b * b).sum(axis=1) / -2, np.full(len(b), -0.5)])
 
 
 def _exponent(a, columns):
     """(n, m) -|a - b|^2/2 of a (n, e) and the `_columns` of b (m, e), in one product."""
-    rows = np.empty((len(a), len(columns)))
-    rows[:, :-2], rows[:, -2], rows[:, -1] = a, 1.0, -_half_squares(a)
+    rows = np.ones((len(a), len(columns)))
+    rows[:, :-2] = a
+    np.add.reduce(a * a, axis=1, out=rows[:, -1])
     return rows @ columns
 
 

@@ -287,7 +287,8 @@ def _key(kind, name, number, field):
 
 def read_law(path, name=None):
     """The RodLaw in a file, by default named like it; InputError when it is none or of another version."""
-    with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, stored):
+    with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, archive):
+        stored = {key: archive[key] for key in archive.files}  # what processes have in common is inflated once
         return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about, name or str(path))
 
 
