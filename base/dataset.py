@@ -21,7 +21,7 @@ SCHEMA = "pneunet-cells-2"
 UPPER = np.triu_indices(6)
 #: directions that a kind may have at most; rows beyond its own are nan
 DIRECTIONS = 10
-#: of the 23 bits of a slope's mantissa, those that are kept: to 1e-4 of itself, a hundredth of what a mesh changes, in half of the file
+#: of the 23 bits of a slope's mantissa, those that are kept: to 1e-4 of itself, a hundredth of what a mesh changes (a seventh off the file)
 SLOPE_BITS = 12
 #: kind -> strains (of e1 e2 e3 k1 k2 k3) that must vanish when free: a one-sided cell maps to itself under a half turn about z, a
 #: twisting one under those about x, y and z

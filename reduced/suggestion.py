@@ -24,17 +24,15 @@ def most_telling(law, shape, count, top_pressure, limit_share, touching=False):
     if len(shape) < count:
         raise InputError(TOO_FEW.format(count, len(shape)))
     pressure = np.full(len(shape), top_pressure)
-    _, beyond, inputs = law.path.at(shape, pressure, 0)
-    ends = beyond > 0
-    pressure[ends] = np.minimum(top_pressure, limit_share * top_pressure * np.exp(-beyond[ends]))
+    _, beyond, _ = law.path.at(shape, pressure, 0)
+    pressure *= np.where(beyond > 0, limit_share * np.exp(-beyond), 1.0)
     if touching:
         if law.stiffness.contact is None:
             raise InputError("the law has seen too few designs whose walls touch: leave out --touching")
         process = law.stiffness.contact.processes[0]
         design, inputs = _touching(law, shape, pressure)
     else:
-        process, design = law.path.learned.processes[0], np.arange(len(shape))
-        inputs[ends] = law.path.at(shape[ends], pressure[ends], 0)[-1]
+        process, design, inputs = law.path.learned.processes[0], np.arange(len(shape)), law.path.at(shape, pressure, 0)[-1]
     blocks = [np.flatnonzero(design == number) for number in np.unique(design)]
     if len(blocks) < count:
         raise InputError(TOO_FEW.format(count, f"{len(blocks)} whose walls touch"))
