@@ -16,6 +16,7 @@ from reduced.law import RodLaw, read_law
 from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
 from reduced.states import sample_of
+from reduced.suggestion import most_telling
 from reduced.training import further_designs, judge_free_states_again, run_training, samples_of
 
 SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
@@ -198,6 +199,17 @@ def test_it_says_when_it_is_asked_outside_and_by_how_much(trained):
     assert any("neo-Hookean" in text for text in law.doubts(other, 0.05))
     with pytest.raises(InputError, match="knows one-sided segments only: take --law analytic"):
         RodLaw({ONE_SIDED: law.kinds[ONE_SIDED]}, {}).strains(design(TWISTING), 0.01)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_design_that_teaches_most_is_the_one_it_knows_least_of(trained, kind):
+    """Without a limit load on the way; the other is one that it was trained on."""
+    data = made_up_data()
+    known = data.shape[(data.kind == data.about["kinds"].index(kind)) & ~data.held_out][0].astype(float)
+    far = known + 0.6 * (known - data.shape.mean(axis=0))
+    law = trained[0].kinds[kind]
+    assert (law.path.at(np.array([known, far]), np.full(2, 0.1), 0)[1] == 0).all()
+    assert most_telling(law, np.array([known, far]), 1, 0.1, 0.9).tolist() == [1]
 
 
 def test_a_table_of_designs_holds_what_single_calls_give(trained):
