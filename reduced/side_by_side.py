@@ -20,15 +20,16 @@ class SideBySide:
         return tuple(np.concatenate(part, axis=1) for part in zip(*found))
 
     def rest(self, x):
-        """All but the first process."""
+        """(n, p - 1) at inputs (n, d), all but the first process."""
         return np.concatenate([process(x) for process in self.processes[1:]], axis=1)
 
     def deviation(self, x):
+        """(n, p) standard deviations at inputs (n, d), without noise."""
         return np.concatenate([process.deviation(x) for process in self.processes], axis=1)
 
 
 def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, **settings):
-    """SideBySide processes of `widths` outputs each; the rest as for `fit`."""
+    """SideBySide processes of `widths` outputs each; the rest as for gaussian.fit."""
     ends = np.cumsum([0, *widths])
     likes = like.processes if like else [None] * len(widths)
     slopes = slopes or gaussian.no_slopes(x.shape[1], y.shape[1])

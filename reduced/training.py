@@ -21,7 +21,7 @@ from reduced.law import RodLaw, read_law, write_law
 from reduced.law_coordinates import cosine
 from reduced.states import folds, sample_of, splits
 
-#: of `further_designs`
+#: of `designs_at_further_angles`
 FURTHER_PARTS = 5
 
 
@@ -104,17 +104,17 @@ def _shown(results, count, what, say):
 
 def judge(laws, samples, mapping=map, say=lambda text: None):
     """{kind: {figure: number}} of KindLaws on the designs that neither they nor, where those are few, laws of parts have seen; and of
-    the designs at further angles, as `further_designs` gives them."""
+    the designs at further angles, as `designs_at_further_angles` gives them."""
     jobs = []
     for kind, law in laws.items():
         (_, held_out), *parts = splits(*samples[kind])
         jobs += [(misses, (law, held_out)), *[(judge_again, (law, *part)) for part in parts]]
-        jobs += [(judge_free_states_again, (law, *part)) for part in further_designs(*samples[kind])]
+        jobs += [(judge_free_states_again, (law, *part)) for part in designs_at_further_angles(*samples[kind])]
     done = iter(list(_shown(mapping(_do, jobs), len(jobs), "judged", say)))
     out = {}
     for kind, law in laws.items():
         found = [next(done) for _ in splits(*samples[kind])]
-        further = [(judged.designs, next(done)) for _, judged in further_designs(*samples[kind])]
+        further = [(judged.designs, next(done)) for _, judged in designs_at_further_angles(*samples[kind])]
         out[kind] = figures(found) | finest_mesh(law, samples[kind][1]) | further_angles(further)
     return out
 
@@ -130,7 +130,7 @@ def judge_free_states_again(law, learned, judged):
     return misses(replace(law, path=path, stiffness=stiffness), judged)
 
 
-def further_designs(training, held_out):
+def designs_at_further_angles(training, held_out):
     """[(what a law learns from, what it is judged on)]: the training designs that are more slanted than any held-out one, as edge designs
     may be, in parts; [] where they are few."""
     slant, most = np.abs(cosine(training.free.shape)), np.abs(cosine(held_out.free.shape)).max()

@@ -17,7 +17,7 @@ from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
 from reduced.states import sample_of
 from reduced.suggestion import most_telling
-from reduced.training import further_designs, judge_free_states_again, run_training, samples_of
+from reduced.training import designs_at_further_angles, judge_free_states_again, run_training, samples_of
 
 SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
@@ -175,7 +175,7 @@ def test_held_out_figures_of_an_easy_law_are_small_and_its_intervals_honest(trai
 def test_designs_more_slanted_than_the_held_out_ones_are_judged_by_laws_that_have_not_seen_them(trained):
     data = made_up_data()
     training, held_out = samples_of(replace(data, held_out=data.held_out & (data.shape[:, 0] > 60)))[ONE_SIDED]
-    pairs = further_designs(training, held_out)
+    pairs = designs_at_further_angles(training, held_out)
     further = training.free.design[training.free.shape[:, 0] < held_out.free.shape[:, 0].min()]
     assert np.array_equal(np.sort(np.concatenate([judged.designs for _, judged in pairs])), np.unique(further)) and len(pairs) == 5
     for learned, judged in pairs:
@@ -184,7 +184,7 @@ def test_designs_more_slanted_than_the_held_out_ones_are_judged_by_laws_that_hav
     learned, judged = pairs[0]
     told = further_angles([(judged.designs, judge_free_states_again(trained[0].kinds[ONE_SIDED], learned, judged))])
     assert told["further_angles_designs"] == len(judged.designs) and 0 < told["further_angles_strain_p95_rel"] < 0.02
-    assert further_designs(*samples_of(data)[ONE_SIDED]) == [] and further_angles([]) == {}
+    assert designs_at_further_angles(*samples_of(data)[ONE_SIDED]) == [] and further_angles([]) == {}
 
 
 def test_it_says_when_it_is_asked_outside_and_by_how_much(trained):
