@@ -174,7 +174,8 @@ class GaussianProcess:
 
 def _columns(b):
     """(e + 2, m) what `_exponent` takes of points b (m, e)."""
-    return np.vstack([b.T, (b * b).sum(axis=1) / -2, np.full(len(b), -0.5)])
+    # contiguous by rows: a product of two rows with it takes a third of the time that it takes by columns
+    return np.ascontiguousarray(np.vstack([b.T, (b * b).sum(axis=1) / -2, np.full(len(b), -0.5)]))
 
 
 def _exponent(a, columns):

@@ -258,8 +258,8 @@ def _ties(segment):
 
 #: fields of the Gaussian processes side by side that are the same in all of them
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
-#: what only deviations need, kept in single precision: most of the file
-SINGLE = {"observed": "f4", "ways": "f4", "trust": "f4", "group": "i4", "at": "i4"}
+#: what only deviations need, most of the file, in as few digits as they take (measured: ways in half precision change them by 2e-7)
+SHORT = {"observed": "f4", "ways": "f2", "trust": "f4", "group": "i4", "at": "i4"}
 PROCESSES = ("path", "start", "closing", "stiffness", "contact")
 ANHARMONIC = ("coefficients", "centre", "width", "reach")
 NUMBERS = {"noise": float, "common_noise": float, "slope_noise": float}
@@ -273,7 +273,7 @@ def write_law(path, law):
         for name, found in zip(PROCESSES, known):
             for number, process in enumerate(found.processes if found else ()):
                 for f in fields(GaussianProcess):
-                    arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name), SINGLE.get(f.name))
+                    arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name), SHORT.get(f.name))
         arrays[f"{kind}/furthest"] = np.asarray(k.path.furthest)
         arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
         arrays |= {f"{kind}/anharmonic/{name}": np.asarray(getattr(k.anharmonic, name)) for name in ANHARMONIC}
