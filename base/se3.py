@@ -8,6 +8,8 @@ Manipulation (1994), App. A; series below `SMALL` keep them exact to rounding.
 import numpy as np
 
 SMALL = 1e-4
+IDENTITY = np.eye(4)
+IDENTITY.flags.writeable = False
 
 
 def hat(vector):
@@ -56,7 +58,7 @@ def hat_pose(twist):
 def screw_basis(twist):
     """(..., 4, 4, 4): the powers 0 to 3 of X = hat_pose(twist), which exp(s X) is a combination of, since X^4 = -|w|^2 X^2."""
     out = np.empty(np.shape(twist)[:-1] + (4, 4, 4))
-    out[..., 0, :, :], out[..., 1, :, :] = np.eye(4), hat_pose(twist)
+    out[..., 0, :, :], out[..., 1, :, :] = IDENTITY, hat_pose(twist)
     out[..., 2, :, :] = out[..., 1, :, :] @ out[..., 1, :, :]
     out[..., 3, :, :] = out[..., 2, :, :] @ out[..., 1, :, :]
     return out

@@ -1,6 +1,7 @@
 """A cell's shape without a length: what strains times a length depend on when the material has only one modulus."""
 
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -11,6 +12,7 @@ SHAPE = (
     *("angle", "width", "chamber_height", "cavity_thickness", "wall", "gap", "top_wall", "side_wall"),
     *("base_thickness", "roof", "channel_width", "channel_height", "cavity_floor"),
 )
+_dimensions = attrgetter(*SHAPE)
 #: kind -> name -> changes of SHAPE by one: the directions in which designs differ when the normal pitch is the unit of length. Walls
 #: and cavities grow at the gap's cost; what a campaign ties together (hifi.campaign_sample) moves together
 _OF_BOTH = {
@@ -56,9 +58,14 @@ def normal_pitch(segment):
 
 def shape_numbers(segment):
     """(13,) the angle in degrees and the lengths of SHAPE in normal pitches."""
-    values = np.array([getattr(segment, name) for name in SHAPE])
-    values[1:] /= normal_pitch(segment)
-    return values
+    return shapes_of([segment])[0][0]
+
+
+def shapes_of(segments):
+    """(`shape_numbers` (n, 13), `normal_pitch` (n,) in mm) of n segments."""
+    shape, pitch = np.array([_dimensions(s) for s in segments]), np.array([normal_pitch(s) for s in segments])
+    shape[:, 1:] /= pitch[:, None]
+    return shape, pitch
 
 
 def segment_of(kind, shape, pitch, material):

@@ -122,9 +122,10 @@ def free_shapes(lengths, strains, samples=20, base_pose=None):
 
 def _joints(coefficients, basis, base_pose):
     """Poses of the joints (..., m + 1, 4, 4) of pieces in a row from their screws: coefficients (..., m, 4), basis (..., m, 4, 4, 4)."""
-    steps = np.moveaxis(np.einsum("...a,...aij->...ij", coefficients, basis), -3, 0)
-    joints = np.empty((len(steps) + 1, *steps.shape[1:]))
-    joints[0] = np.eye(4) if base_pose is None else base_pose
-    for before, step, after in zip(joints, steps, joints[1:]):
-        np.matmul(before, step, out=after)
-    return np.moveaxis(joints, 0, -3)
+    lead, m = coefficients.shape[:-2], coefficients.shape[-2]
+    steps = (coefficients[..., None, :] @ basis.reshape(*lead, m, 4, 16)).reshape(*lead, m, 4, 4)
+    joints = np.empty((*lead, m + 1, 4, 4))
+    joints[..., 0, :, :] = se3.IDENTITY if base_pose is None else base_pose
+    for i in range(m):
+        np.matmul(joints[..., i, :, :], steps[..., i, :, :], out=joints[..., i + 1, :, :])
+    return joints

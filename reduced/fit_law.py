@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from reduced import gaussian
+from reduced.closing import Closing
 from reduced.free_path import FreePath
 from reduced.free_stiffness import FreeStiffness, order
 from reduced.judging import symmetric
@@ -22,10 +23,10 @@ INTERVAL = 0.9
 #: the training designs' ranges are widened by this part before a design is outside
 MARGIN = 0.02
 
-#: points that the free states are summed up on, as many as a rod of both kinds may cost in half a millisecond; and those of the rough
-#: process that the search for the leading strain starts from: within some 3 % of it (measured: median), from where one step is
-#: mostly enough
-INDUCING, ROUGH = 1450, 300
+#: points that the free states are summed up on, as many as a rod of both kinds may cost in half a millisecond; those of how walls
+#: close; those of the rough process that the search for the leading strain starts from: within some 3 % of it (measured: median), from
+#: where one step is mostly enough; and those of the stiffness
+INDUCING, CLOSING, ROUGH, OF_STIFFNESS = 1600, 1000, 300, 2200
 #: times the largest leading strain of the training designs: up to there paths of free states are followed
 FURTHEST = 1.2
 #: a deviation above this many times the largest one at the training points, rest included, is outside
@@ -71,11 +72,12 @@ def told_by_angle(states):
 def fit_path(states, like=None, again=False, slopes=True):
     """The FreePath of the free states; the leading strain has a metric of its own (measured: a quarter off its error)."""
     states = states.loaded
-    co = Coordinates(states.kind)
+    co, closing = Coordinates(states.kind), fit_closing(states, like and like.closing.process, again)
 
     def inputs(shape, strains, matrices, s):
         with np.errstate(invalid="ignore"):
-            return co.path_inputs(shape, co.leading(strains), s.level)
+            lead = co.leading(strains)
+            return co.path_inputs(shape, lead, s.level, closing.overlap(shape, s.pressure, lead))
 
     def outputs(shape, strains, matrices, s):
         with np.errstate(invalid="ignore"):
@@ -90,7 +92,7 @@ def fit_path(states, like=None, again=False, slopes=True):
         steep = steep.of((np.abs(in_deviations(steep, x[good])) < STEEPEST).all(axis=1))
     learned = fit_strains(states, good, x, y, steep, like and like.learned, again)
     start = fit_side_by_side(states.inputs[good], -y[good, :1], states.case[good], np.ones((good.sum(), 1)), (1,), inducing=ROUGH)
-    return FreePath(states.kind, learned, start, FURTHEST * float(co.leading(states.strains).max()))
+    return FreePath(states.kind, closing, learned, start, FURTHEST * float(co.leading(states.strains).max()))
 
 
 def fit_strains(states, good, x, y, slopes=None, like=None, again=False):
@@ -102,29 +104,31 @@ def fit_strains(states, good, x, y, slopes=None, like=None, again=False):
 
 
 def fit_closing(states, like=None, again=False):
-    """Gaussian process of `States.closing`."""
+    """The Closing of free states; like: the process of another one."""
+    if len(np.unique(states.design[states.touching])) < TELLING:
+        return Closing(states.kind, None)
     states = states.of(np.isfinite(states.closing))
     co = Coordinates(states.kind)
-    x, y = co.closing_inputs(states.shape, co.closing_load(states.pressure, states.strains)), states.closing[:, None]
-    return fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), like=like, again=again, most=MANY)
+    x, y = co.closing_inputs(states.shape, co.closing_load(states.pressure, co.leading(states.strains))), states.closing[:, None]
+    settings = {"like": like, "again": again, "most": MANY, "inducing": CLOSING}
+    return Closing(states.kind, fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), **settings))
 
 
-def fit_stiffness(states, like=None, again=False):
-    """The FreeStiffness of free states."""
+def fit_stiffness(states, closing, like=None, again=False):
+    """The FreeStiffness of free states whose walls close as the Closing says."""
     co = Coordinates(states.kind)
-    closing = fit_closing(states, like and like.closing, again)
     y = co.learned_stiffness(states.shape, states.matrices)
     good, touching = np.isfinite(y).all(axis=1), states.touching
-    if len(np.unique(states.design[touching & good])) < TELLING:
-        return FreeStiffness(states.kind, closing, _fit_smooth(states.of(good), like and like.smooth, again), None)
+    if closing.process is None or len(np.unique(states.design[touching & good])) < TELLING:
+        return FreeStiffness(states.kind, _fit_smooth(states.of(good), like and like.smooth, again), None)
     smooth = _fit_smooth(states.of(good & ~touching), like and like.smooth, again)
     states, y = states.of(good & touching), y[good & touching]
-    closed = FreeStiffness(states.kind, closing, smooth, None).closed(states.shape, states.pressure, states.strains)
+    closed = closing.closed(states.shape, states.pressure, states.strains)
     added = (y - smooth(co.stiffness_inputs(states.shape, states.strains, states.level)))[:, order(co)]
     trust, x = _trust_in_stiffness(states)[:, order(co)], co.contact_inputs(states.shape, states.strains, closed)
     settings = {"like": like and like.contact, "again": again, "noises": CONTACT_NOISES}
     contact = fit_side_by_side(x, added, states.case, trust, (1, added.shape[1] - 1), **settings)
-    return FreeStiffness(states.kind, closing, smooth, contact)
+    return FreeStiffness(states.kind, smooth, contact)
 
 
 def _trust_in_stiffness(states):
@@ -146,7 +150,8 @@ def _fit_smooth(states, like, again):
     known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states) & ~states.touching[:, None]
     steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
     steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
-    return fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, like, again=again)
+    settings = {"like": like, "again": again, "inducing": OF_STIFFNESS}
+    return fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, **settings)
 
 
 def fit_kind(sample, like=None, again=True):
@@ -154,9 +159,9 @@ def fit_kind(sample, like=None, again=True):
     are taken as they are."""
     states, around = sample.free, sample.around
     path = fit_path(states, like and like.path, again=again)
-    stiffness = fit_stiffness(states, like and like.stiffness, again=again)
+    stiffness = fit_stiffness(states, path.closing, like and like.stiffness, again=again)
     co = Coordinates(states.kind)
-    closed = stiffness.closed(around.shape, around.pressure, around.strains)
+    closed = path.closing.closed(around.shape, around.pressure, around.strains)
     x = co.around_inputs(around.shape, around.strains, closed)
     anharmonic = fit_anharmonic(states.kind, x, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces)
     x = states.inputs

@@ -10,29 +10,22 @@ from functools import cached_property
 
 import numpy as np
 
-from reduced.law_coordinates import GAP, SMALLEST, TINY, Coordinates
+from reduced.law_coordinates import TINY, Coordinates
 from reduced.side_by_side import SideBySide
 
 
 @dataclass(frozen=True)
 class FreeStiffness:
-    """closing: process of States.closing; smooth: of Coordinates.learned_stiffness without contact; contact: of what that adds, in
-    `order`, or None where too few designs were seen to touch and smooth has learned from all of them."""
+    """smooth: process of Coordinates.learned_stiffness without contact; contact: of what that adds, in `order`, or None where too few
+    designs were seen to touch and smooth has learned from all of them."""
 
     kind: str
-    closing: SideBySide
     smooth: SideBySide
     contact: SideBySide | None
 
     @cached_property
     def coordinates(self):
         return Coordinates(self.kind)
-
-    def closed(self, shape, pressure, strains):
-        """(n,) part of the gap that walls have closed in free states with these strains (n, 6), as if they could go on: from 1 on they
-        touch. shape (n, 13), pressure P/mu (n,)."""
-        load = self.coordinates.closing_load(pressure, strains)
-        return self.closing(self.coordinates.closing_inputs(shape, load))[:, 0] * load / np.maximum(shape[:, GAP], SMALLEST)
 
     def at(self, shape, strains, closed, level):
         """(n, 6, 6) of free states with these strains (n, 6) whose walls have closed so much of their gap (n,), on the mesh of a level."""

@@ -110,12 +110,21 @@ class GaussianProcess:
         return self.weights[len(self.points) + 1 :] / self.width[:, None]
 
     @cached_property
+    def _linear(self):
+        return np.hstack([self.to_kernel, self.plane])
+
+    @cached_property
     def _columns(self):
         return _columns(self.points)
 
     @cached_property
     def _weighed_points(self):
         return (self.weights[: len(self.points), :, None] * self.points[:, None, :]).reshape(len(self.points), -1)
+
+    def linear(self, x):
+        """(inputs x (n, d) where distances are the kernel's (n, d), constant and plane (n, p))."""
+        both, d = (x - self.shift) @ self._linear, len(self.to_kernel)
+        return both[:, :d], both[:, d:] + self.weights[len(self.points)]
 
     def exponent(self, a):
         """(n, m) logarithms of the kernels at the inducing points, of inputs a (n, d) in the same space."""
@@ -138,12 +147,11 @@ class GaussianProcess:
         if len(x) > ROWS:
             parts = [self(x[i : i + ROWS], derivative) for i in range(0, len(x), ROWS)]
             return tuple(map(np.concatenate, zip(*parts))) if derivative else np.concatenate(parts)
-        z, m = x - self.shift, len(self.points)
-        a = z @ self.to_kernel
+        a, plane = self.linear(x)
         kernel = self.exponent(a)
         np.exp(kernel, out=kernel)
-        curved = kernel @ self.weights[:m]
-        mean = curved + self.weights[m] + z @ self.plane
+        curved = kernel @ self.weights[: len(self.points)]
+        mean = curved + plane
         if not derivative:
             return mean
         # d k(a, b)/d a = k (b - a)
@@ -180,8 +188,8 @@ def _columns(b):
 
 def _exponent(a, columns):
     """(n, m) -|a - b|^2/2 of a (n, e) and the `_columns` of b (m, e), in one product."""
-    rows = np.ones((len(a), len(columns)))
-    rows[:, :-2] = a
+    rows = np.empty((len(a), len(columns)))
+    rows[:, :-2], rows[:, -2] = a, 1.0
     np.add.reduce(a * a, axis=1, out=rows[:, -1])
     return rows @ columns
 

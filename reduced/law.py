@@ -15,7 +15,8 @@ from base.errors import InputError
 from base.materials import NeoHookean
 from base.strains import RodStrains
 from geometry.parameters import TWISTING
-from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers
+from geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers, shapes_of
+from reduced.closing import Closing
 from reduced.free_path import FreePath
 from reduced.free_stiffness import FreeStiffness
 from reduced.gaussian import GaussianProcess
@@ -24,7 +25,7 @@ from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, anharmonic_gradient, anharmonic_hessian, anharmonic_value, whitening
 from reduced.side_by_side import SideBySide
 
-SCHEMA = "pneunet-law-5"
+SCHEMA = "pneunet-law-6"
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so
 TIE_TOLERANCE = 0.02
 #: `make bench ONLY=silicones`, docs/rod-law.md
@@ -79,7 +80,7 @@ class KindLaw:
     def closed(self, shape, pressure, strains):
         """(n,) part of the gap that walls have closed in free states with these strains (n, 6), as if they could go on: from 1 on they
         touch."""
-        return self.stiffness.closed(shape, pressure, strains)
+        return self.path.closing.closed(shape, pressure, strains)
 
     def anharmonic_at(self, shape, strains, closed):
         """What reduced.potential's anharmonic forms are made of around free states with these strains (n, 6)."""
@@ -127,14 +128,14 @@ class RodLaw(SegmentLaw):
         """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
         pressures = checked_pressure(pressures)
         kinds, m = [s.kind for s in segments], len(pressures)
-        shape = np.array([shape_numbers(s) for s in segments])
+        shape, pitch = shapes_of(segments)
         P = pressures / np.array([s.material.mu for s in segments])[:, None]
         q = np.empty((len(segments), m, 6))
         for kind in set(kinds):
             rows = [i for i, k in enumerate(kinds) if k == kind]
             law = self._kind(segments[rows[0]])
             q[rows] = law.free_strains(shape[rows].repeat(m, axis=0), P[rows].ravel()).reshape(-1, m, 6)
-        return RodStrains(q[..., :3], q[..., 3:] / np.array([normal_pitch(s) for s in segments])[:, None, None])
+        return RodStrains(q[..., :3], q[..., 3:] / pitch[:, None, None])
 
     def each(self, segments, pressure):
         """RodStrains (n, 3) of n segments at one pressure in MPa, all at once."""
@@ -260,7 +261,7 @@ def _ties(segment):
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
 #: what only deviations need, most of the file, in as few digits as they take (measured: ways in half precision change them by 2e-7)
 SHORT = {"observed": "f4", "ways": "f2", "trust": "f4", "group": "i4", "at": "i4"}
-PROCESSES = ("path", "start", "closing", "stiffness", "contact")
+PROCESSES = ("closing", "path", "start", "stiffness", "contact")
 ANHARMONIC = ("coefficients", "centre", "width", "reach")
 NUMBERS = {"noise": float, "common_noise": float, "slope_noise": float}
 
@@ -269,7 +270,7 @@ def write_law(path, law):
     """Write a RodLaw (.npz)."""
     arrays = {}
     for kind, k in law.kinds.items():
-        known = k.path.learned, k.path.start, k.stiffness.closing, k.stiffness.smooth, k.stiffness.contact
+        known = k.path.closing.process, k.path.learned, k.path.start, k.stiffness.smooth, k.stiffness.contact
         for name, found in zip(PROCESSES, known):
             for number, process in enumerate(found.processes if found else ()):
                 for f in fields(GaussianProcess):
@@ -301,8 +302,9 @@ def _read_kind(stored, kind):
             values |= {field: number_type(values[field]) for field, number_type in NUMBERS.items()}
             processes[name].append(GaussianProcess(**values))
             number += 1
-    learned, start, *of_stiffness = (SideBySide(tuple(found)) if found else None for found in processes.values())
-    path, stiffness = FreePath(kind, learned, start, float(stored[f"{kind}/furthest"])), FreeStiffness(kind, *of_stiffness)
+    closing, learned, start, *of_stiffness = (SideBySide(tuple(found)) if found else None for found in processes.values())
+    path = FreePath(kind, Closing(kind, closing), learned, start, float(stored[f"{kind}/furthest"]))
+    stiffness = FreeStiffness(kind, *of_stiffness)
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, *(stored[f"{kind}/anharmonic/{name}"] for name in ANHARMONIC))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])

@@ -66,27 +66,40 @@ class Coordinates:
         x[:, 1:-2] = np.log(self._lengths(shape))
         return x
 
-    def path_inputs(self, shape, lead, level):
-        """(n, d) the same with the leading strain (n,) in the place of the pressure."""
+    def path_inputs(self, shape, lead, level, overlap):
+        """(n, d + 1) the same with the leading strain (n,) in the place of the pressure, and `overlap_input` (n,)."""
         x = self.inputs(shape, np.zeros(len(shape)), level)
         x[:, -2] = np.log(lead + SMALL_STRAIN)
-        return x
+        return np.column_stack([x, self.overlap_input(overlap)])
+
+    @staticmethod
+    def overlap_input(overlap):
+        """(n,) regression input of by how much walls would overlap (n,), in normal pitches: the same for all that are apart."""
+        return np.log(np.maximum(overlap, 0) + SMALL_OVERLAP)
+
+    @staticmethod
+    def overlap_input_slope(overlap):
+        """(n,) its derivative."""
+        return (overlap > 0) / (np.maximum(overlap, 0) + SMALL_OVERLAP)
 
     def leading(self, strains):
         """(n,) the leading one of the strains (n, 6), 0 at rest."""
         lead = LEADING[self.kind][0]
         return strains[:, lead] - REST[lead]
 
-    def closing_load(self, pressure, strains):
+    def closing_load(self, pressure, lead):
         """(n,) what walls close in proportion to, almost: the leading strain of a one-sided, the pressure of a twisting segment, whose
         stretch opens the gaps while its walls bulge. (Measured, of the load at which walls touch: the 90th percentile of the error is 9
         and 7 % of the top one; the other way round 20 and 15 %.)"""
-        return self.leading(strains) if self.kind == ONE_SIDED else pressure
+        return lead if self.kind == ONE_SIDED else pressure
 
     def closing_inputs(self, shape, load):
-        """(n, d - 1) regression inputs of how far walls close over the load: the same, whatever the mesh."""
-        x = self.inputs(shape, np.zeros(len(shape)), 0)
-        return np.column_stack([x[:, :-2], load])
+        """(n, d - 1) regression inputs of how far walls close over the load (n,): the same, whatever the mesh."""
+        return self.with_load(self.inputs(shape, np.zeros(len(shape)), 0), load)
+
+    def with_load(self, inputs, load):
+        """(n, d - 1) the same with what `inputs` (n, .) say of the shape."""
+        return np.concatenate([inputs[:, : len(LENGTHS[self.kind]) + 1], load[:, None]], axis=1)
 
     def stiffness_inputs(self, shape, strains, level):
         """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place of the pressure. (What
@@ -99,7 +112,7 @@ class Coordinates:
         """(n, d) those of what contact adds to it, the same, whatever the mesh: by how much walls would overlap, having `closed` (n,)
         so much of their gap, in the mesh's place."""
         x = self.stiffness_inputs(shape, strains, 0)
-        x[:, -1] = np.log(np.maximum(closed - 1, 0) * shape[:, GAP] + SMALL_OVERLAP)
+        x[:, -1] = self.overlap_input((closed - 1) * shape[:, GAP])
         return x
 
     @staticmethod
@@ -161,9 +174,10 @@ class Coordinates:
         return np.eye(6)[first], np.eye(6)[list(others)]
 
     def by_shape(self, shape, slopes):
-        """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, d) by inputs; one more, 0, for the pressure."""
+        """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, .) by inputs, those by others than the shape
+        left out; one more, 0, for the pressure."""
         by = np.zeros((*slopes.shape[:2], len(SHAPE) + 1))
-        by[:, :, :-1] = (slopes[:, :, 1:-2] / self._lengths(shape)[:, None]) @ self._sums.T
+        by[:, :, :-1] = (slopes[:, :, 1 : len(LENGTHS[self.kind]) + 1] / self._lengths(shape)[:, None]) @ self._sums.T
         by[:, :, 0] = slopes[:, :, 0] * (2 * cosine(shape) * _by_angle(shape))[:, None]
         return by
 

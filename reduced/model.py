@@ -51,7 +51,7 @@ class SegmentLaw(ABC):
 def checked_pressure(pressure):
     """Pressure as an array; InputError where it is not finite or negative."""
     pressure = np.asarray(pressure, float)
-    if not (np.isfinite(pressure).all() and (pressure >= 0).all()):
+    if not ((pressure >= 0) & (pressure < np.inf)).all():
         raise InputError("pressure_kPa: give finite values >= 0")
     return pressure
 

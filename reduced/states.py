@@ -141,7 +141,8 @@ def _met(first_touch):
 def _closing(data, rows, coordinates):
     """Pairs (row, States.closing) of a case's free states, which have these rows, at rest first: those that say something."""
     distance, pressure = (a[rows].astype(float) for a in (data.wall_distance, data.pressure))
-    load, first = coordinates.closing_load(pressure, data.strains[rows].astype(float)), _met(data.first_touch[data.case[rows[0]]])
+    lead = coordinates.leading(data.strains[rows].astype(float))
+    load, first = coordinates.closing_load(pressure, lead), _met(data.first_touch[data.case[rows[0]]])
     for n in range(1, len(rows)):
         if load[n] <= 0:
             continue

@@ -126,7 +126,8 @@ def judge_again(law, learned, judged):
 
 def judge_free_states_again(law, learned, judged):
     """The same of the free states alone, with the law's own metrics."""
-    path, stiffness = fit_path(learned.free, law.path), fit_stiffness(learned.free, law.stiffness)
+    path = fit_path(learned.free, law.path)
+    stiffness = fit_stiffness(learned.free, path.closing, law.stiffness)
     return misses(replace(law, path=path, stiffness=stiffness), judged)
 
 

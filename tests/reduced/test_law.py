@@ -10,8 +10,8 @@ from base.errors import InputError
 from base.materials import NeoHookean, Yeoh
 from geometry.parameters import KINDS, ONE_SIDED, TWISTING
 from geometry.shape_numbers import SHAPE, direction_matrix, segment_of, shape_numbers
-from reduced.fit_law import fit_path, fit_stiffness
-from reduced.judging import further_angles, stiffness_error
+from reduced.fit_law import fit_closing, fit_path, fit_stiffness
+from reduced.judging import further_angles, stiffness_error, strain_error
 from reduced.law import RodLaw, read_law
 from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
@@ -287,12 +287,43 @@ def test_stiffness_jumps_where_walls_touch():
         wall_distance=(np.maximum(1 - closed, 0) * gap[data.case]).astype("f4"),
     )
     learned, seen = (sample_of(touched, TWISTING, held_out).free for held_out in (False, True))
-    stiffness = fit_stiffness(learned)
-    closed = stiffness.closed(seen.shape, seen.pressure, seen.strains)
+    closing = fit_closing(learned)
+    stiffness, closed = fit_stiffness(learned, closing), closing.closed(seen.shape, seen.pressure, seen.strains)
     assert (closed > 1).tolist() == seen.touching.tolist() and 0.2 < seen.touching.mean() < 0.8
     assert stiffness_error(seen, stiffness.at(seen.shape, seen.strains, closed, 0)).max() < 0.05
-    few = fit_stiffness(learned.of(np.isin(learned.design, np.unique(learned.design)[:8])))
-    assert few.contact is None
+    few = learned.of(np.isin(learned.design, np.unique(learned.design)[:8]))
+    assert fit_closing(few).process is None and fit_stiffness(few, fit_closing(few)).contact is None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_paths_of_free_states_have_a_kink_where_walls_touch(kind):
+    """Walls close in proportion to the leading strain (one-sided) or the pressure; the more they overlap, the more the cell strains."""
+    data, rest = made_up_data(), np.zeros(6)
+    rest[0] = 1.0
+    wall, gap = (data.shape[:, SHAPE.index(name)].astype(float) for name in ("wall", "gap"))
+    first, strains, distance = 0.15 * np.exp(10 * (wall - 0.2)), data.strains.astype(float), np.zeros(len(data.strains))
+    place = {ONE_SIDED: 4, TWISTING: 0}[kind]
+    for i, case in enumerate(data.case):
+        at_touch = true_free(kind, data.shape[case], first[case])[place] - rest[place]
+        change, lead, factor = strains[i] - rest, strains[i, place] - rest[place], 1.0
+        for _ in range(60):
+            closed = factor * lead / at_touch if kind == ONE_SIDED else data.pressure[i] / first[case]
+            factor = 1 + 0.1 * np.log1p(max(closed - 1, 0) * gap[case] / 0.05)
+        strains[i], distance[i] = rest + factor * change, max(1 - closed, 0) * gap[case]
+    touched = replace(data, first_touch=first.astype("f4"), strains=strains, wall_distance=distance.astype("f4"))
+    learned, seen = (sample_of(touched, kind, held_out).free.loaded for held_out in (False, True))
+    told = fit_path(learned, slopes=False)
+    untold = fit_path(replace(learned, touching=np.zeros(len(learned.design), bool)), slopes=False)
+    errors = [strain_error(seen, path.strains(seen.shape, seen.pressure, 0)) for path in (told, untold)]
+    assert errors[0].max() < 0.03 and errors[0].mean() < errors[1].mean() / 2 and untold.closing.process is None
+    shape, P, h = seen.shape[:1], np.array([0.25]), 1e-5
+    assert told.closing.overlap(shape, P, told.at(shape, P, 0)[0]) > 0
+    _, slopes = told.strains_and_slopes(shape, P, 0)
+    for name, step in (("gap", h), ("wall", h), ("angle", 100 * h), ("pressure", h)):
+        i = -1 if name == "pressure" else SHAPE.index(name)
+        by_shape, by_pressure = (step * np.eye(13)[i], 0.0) if i >= 0 else (np.zeros(13), step)
+        ends = [told.strains(shape + sign * by_shape, P + sign * by_pressure, 0)[0] for sign in (1, -1)]
+        assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slopes[0, :, i], rel=2e-3, abs=2e-5)
 
 
 def test_beyond_a_limit_load_strains_stay_and_it_says_so():
