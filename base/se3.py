@@ -8,6 +8,7 @@ Manipulation (1994), App. A; series below `SMALL` keep them exact to rounding.
 import numpy as np
 
 SMALL = 1e-4
+#: (4, 4), of poses; read only
 IDENTITY = np.eye(4)
 IDENTITY.flags.writeable = False
 

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reduced.along_inputs import AlongInputs
 from reduced.gaussian import NEAR, TREND, Slopes, _misfit, _spread_over, fit
 
 
@@ -82,6 +83,19 @@ def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():
     for i in range(2):
         step = h * np.eye(2)[i]
         assert (process(new + step) - process(new - step)) / (2 * h) == pytest.approx(slopes[:, :, i], abs=1e-5)
+
+
+def test_along_some_inputs_it_is_the_same_process_with_second_derivatives():
+    x, y, group = observed(60)
+    process, new, h = fit(x, y, group), observed(30, seed=1)[0], 1e-5
+    along = AlongInputs(process, [1, 0])
+    value, slopes, second = along.at(new)
+    known, gradient = process(new, derivative=True)
+    assert value == pytest.approx(known[:, 0], abs=1e-9) and slopes == pytest.approx(gradient[:, 0, ::-1], abs=1e-8)
+    for place, column in ((1, 0), (0, 1)):
+        step = h * np.eye(2)[place]
+        ends = [along.at(new + sign * step)[1] for sign in (1, -1)]
+        assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(second[:, column], abs=1e-4)
 
 
 def test_the_metric_is_found_on_one_state_of_each_path_first():
