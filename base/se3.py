@@ -13,14 +13,21 @@ IDENTITY = np.eye(4)
 IDENTITY.flags.writeable = False
 
 
+def _generators():
+    """(6, 4, 4) hat_pose of the unit twists."""
+    out = np.zeros((6, 4, 4))
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        out[i, k, j], out[i, j, k], out[3 + i, i, 3] = 1.0, -1.0, 1.0
+    return out
+
+
+_GENERATORS = _generators()
+
+
 def hat(vector):
     """Skew matrices (..., 3, 3) of vectors (..., 3): hat(a) b = a x b."""
     v = np.asarray(vector, float)
-    out = np.zeros(v.shape[:-1] + (3, 3))
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = x, y, z
-    out[..., 1, 2], out[..., 2, 0], out[..., 0, 1] = -x, -y, -z
-    return out
+    return (v @ _GENERATORS[:3, :3, :3].reshape(3, 9)).reshape(v.shape[:-1] + (3, 3))
 
 
 def _coefficients(angle):
@@ -51,9 +58,7 @@ def log_rotation(rotation):
 def hat_pose(twist):
     """Matrices (..., 4, 4) of twists (..., 6), the exponents of their poses."""
     twist = np.asarray(twist, float)
-    out = np.zeros(twist.shape[:-1] + (4, 4))
-    out[..., :3, :3], out[..., :3, 3] = hat(twist[..., :3]), twist[..., 3:]
-    return out
+    return (twist @ _GENERATORS.reshape(6, 16)).reshape(twist.shape[:-1] + (4, 4))
 
 
 def screw_basis(twist):

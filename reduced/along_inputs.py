@@ -19,10 +19,9 @@ class AlongInputs:
 
     def at(self, x):
         """(value (n,), slopes (n, p), second derivatives (n, p, p)) at inputs (n, d)."""
-        a, plane = self._process.linear(x)
-        kernel = self._process.exponent(a)
-        sums, a, p = np.exp(kernel, out=kernel) @ self._weights, a @ self._ways.T, len(self._slope)
+        linear, (p, d) = self._process.linear(x), self._ways.shape
+        sums, a = self._process.kernels(linear).dot(self._weights), linear[:, :d].dot(self._ways.T)
         total, by_b, by_both = sums[:, :1], sums[:, 1 : p + 1], sums[:, p + 1 :].reshape(-1, p, p)
         first = by_b - a * total
         second = by_both - a[:, :, None] * first[:, None] - by_b[:, :, None] * a[:, None] - total[:, :, None] * self._square
-        return total[:, 0] + plane[:, 0], first + self._slope, second
+        return total[:, 0] + linear[:, d + 2], first + self._slope, second

@@ -125,7 +125,8 @@ def _joints(coefficients, basis, base_pose):
     lead, m = coefficients.shape[:-2], coefficients.shape[-2]
     steps = (coefficients[..., None, :] @ basis.reshape(*lead, m, 4, 16)).reshape(*lead, m, 4, 4)
     joints = np.empty((*lead, m + 1, 4, 4))
-    joints[..., 0, :, :] = se3.IDENTITY if base_pose is None else base_pose
-    for i in range(m):
-        np.matmul(joints[..., i, :, :], steps[..., i, :, :], out=joints[..., i + 1, :, :])
+    pose = joints[..., 0, :, :]
+    pose[...] = se3.IDENTITY if base_pose is None else base_pose
+    for step, joint in zip(steps.swapaxes(0, -3), joints.swapaxes(0, -3)[1:]):
+        pose = np.matmul(pose, step, out=joint)
     return joints

@@ -146,9 +146,9 @@ class FreePath:
 def _euler(missing, slope, curvature):
     """(n,) steps to where slope s + curvature s^2/2 is what is missing, on the branch of positive slope, or to the parabola's top."""
     inside = slope**2 + 2 * curvature * missing
+    if np.minimum.reduce(slope) > FLAT and np.minimum.reduce(inside) >= 0:
+        return np.minimum(2 * missing / (slope + np.sqrt(inside)), LONGEST)
     root = np.sqrt(np.maximum(inside, 0))
-    if slope.min() > FLAT and inside.min() >= 0:
-        return np.minimum(2 * missing / (slope + root), LONGEST)
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(slope > 0, 2 * missing / (slope + root), np.where(curvature < 0, (root - slope) / curvature, -LONGEST))
         step = np.where((inside < 0) & (curvature < 0), -slope / curvature, step)

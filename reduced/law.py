@@ -127,12 +127,12 @@ class RodLaw(SegmentLaw):
     def table(self, segments, pressures):
         """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
         pressures = checked_pressure(pressures)
-        kinds, m = [s.kind for s in segments], len(pressures)
-        shape, pitch = shapes_of(segments)
+        (shape, pitch), m, alike = shapes_of(segments), len(pressures), {}
         P = pressures / np.array([s.material.mu for s in segments])[:, None]
         q = np.empty((len(segments), m, 6))
-        for kind in set(kinds):
-            rows = [i for i, k in enumerate(kinds) if k == kind]
+        for i, segment in enumerate(segments):
+            alike.setdefault(segment.kind, []).append(i)
+        for rows in alike.values():
             law = self._kind(segments[rows[0]])
             q[rows] = law.free_strains(shape[rows].repeat(m, axis=0), P[rows].ravel()).reshape(-1, m, 6)
         return RodStrains(q[..., :3], q[..., 3:] / pitch[:, None, None])

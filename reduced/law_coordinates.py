@@ -134,7 +134,7 @@ class Coordinates:
         return out
 
     def _lengths(self, shape):
-        return np.maximum(shape @ self._sums, SMALLEST)
+        return np.maximum(shape.dot(self._sums), SMALLEST)
 
     @property
     def names(self):

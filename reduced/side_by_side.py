@@ -1,6 +1,7 @@
 """Gaussian processes of several outputs side by side, each with metric and noise of its own."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,14 +15,17 @@ class SideBySide:
     processes: tuple
 
     def __call__(self, x, derivative=False):
+        if len(self.processes) == 1:
+            return self.processes[0](x, derivative)
         found = [process(x, derivative) for process in self.processes]
         if not derivative:
             return np.concatenate(found, axis=1)
         return tuple(np.concatenate(part, axis=1) for part in zip(*found))
 
-    def rest(self, x):
-        """(n, p - 1) at inputs (n, d), all but the first process."""
-        return np.concatenate([process(x) for process in self.processes[1:]], axis=1)
+    @cached_property
+    def rest(self):
+        """All but the first process."""
+        return SideBySide(self.processes[1:])
 
     def deviation(self, x):
         """(n, p) standard deviations at inputs (n, d), without noise."""
