@@ -164,7 +164,7 @@ def fit_kind(sample, like=None, again=True):
     closed = path.closing.closed(around.shape, around.pressure, around.strains)
     x = co.around_inputs(around.shape, around.strains, closed)
     anharmonic = fit_anharmonic(states.kind, x, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces)
-    x = states.inputs
+    x = co.ranged(states.shape, states.pressure, states.level)
     level = int(states.level.max())
     doubt = DOUBT * float(path.deviation(path.at(states.shape, np.maximum(states.pressure, LOWEST), level)[-1]).max())
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))

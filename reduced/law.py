@@ -25,7 +25,7 @@ from reduced.model import SegmentLaw, checked_pressure
 from reduced.potential import Anharmonic, anharmonic_gradient, anharmonic_hessian, anharmonic_value, whitening
 from reduced.side_by_side import SideBySide
 
-SCHEMA = "pneunet-law-6"
+SCHEMA = "pneunet-law-7"
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so
 TIE_TOLERANCE = 0.02
 #: `make bench ONLY=silicones`, docs/rod-law.md
@@ -39,7 +39,7 @@ LOWEST = 1e-9
 @dataclass(frozen=True)
 class KindLaw:
     """The law of one kind. path, stiffness: of the free states; anharmonic: of the enthalpy around them; quantile (6,): what a standard
-    deviation of each strain is multiplied by for a 90 % interval; low, high (d,): range of the inputs; doubt: largest deviation of
+    deviation of each strain is multiplied by for a 90 % interval; low, high (r,): range of Coordinates.ranged; doubt: largest deviation of
     the free states' pressure that counts as known; level: the mesh that is predicted, by its place among those trained on, the
     finest last."""
 
@@ -57,8 +57,8 @@ class KindLaw:
     def coordinates(self):
         return Coordinates(self.kind)
 
-    def _inputs(self, shape, pressure):
-        return self.coordinates.inputs(shape, pressure, self.level)
+    def _ranged(self, shape, pressure):
+        return self.coordinates.ranged(shape, pressure, self.level)
 
     def free_strains(self, shape, pressure):
         """(n, 6) free strains of shape numbers (n, 13) at P/mu (n,); beyond the end of their path, as at a limit load, those there."""
@@ -91,10 +91,10 @@ class KindLaw:
         return self.quantile * self.path.spread(shape, np.maximum(pressure, LOWEST), self.level)
 
     def excess(self, shape, pressure):
-        """(n, d + 2) how far a design lies outside what the law was taught: of each input in widths of its range, of the free states'
-        deviation in units of the largest that counts as known, and of log P beyond the end of their path; 0 inside."""
+        """(n, r + 2) how far a design lies outside what the law was taught: of each of Coordinates.ranged in widths of its range, of the
+        free states' deviation in units of the largest that counts as known, and of log P beyond the end of their path; 0 inside."""
         pressure = np.maximum(pressure, LOWEST)
-        x = self._inputs(shape, pressure)
+        x = self._ranged(shape, pressure)
         width = np.maximum(self.high - self.low, 1.0)  # a level's may be 0
         box = np.maximum(np.maximum(self.low - x, x - self.high) - 1e-9, 0) / width
         _, beyond, there = self.path.at(shape, pressure, self.level)
@@ -143,7 +143,7 @@ class RodLaw(SegmentLaw):
         return RodStrains(found.e[:, 0], found.k[:, 0])
 
     def excess(self, segment, pressure):
-        """(d + 2,) how far a segment at a pressure (MPa) lies outside what the law was taught; KindLaw.excess."""
+        """(r + 2,) how far a segment at a pressure (MPa) lies outside what the law was taught; KindLaw.excess."""
         return self._kind(segment).excess(shape_numbers(segment)[None], np.array([pressure / segment.material.mu]))[0]
 
     def doubts(self, segment, pressure):
@@ -189,7 +189,7 @@ class SectionLaw:
         shape, p = self._rows(P)
         law, co = self.law, self.law.coordinates
         excess = law.excess(shape, p)
-        told = co.told(law._inputs(shape, p)[excess.max(axis=1).argmax()])
+        told = co.told(law._ranged(shape, p)[excess.max(axis=1).argmax()])
         known = np.sort([co.told(law.low), co.told(law.high)], axis=0).T
         reasons = [
             f"{name} = {value:.3g} is outside the trained law's {low:.3g} to {high:.3g}"

@@ -38,6 +38,8 @@ LENGTHS = {
     ONE_SIDED: _OF_BOTH | {"core's height": {"base_thickness": 1, "channel_height": 1, "roof": 1}},
     TWISTING: _OF_BOTH | {"core's half height": {"channel_height": 0.5, "roof": 1}, "cavity_floor": {"cavity_floor": 1}},
 }
+#: kind -> lengths that the sample varies and that LENGTHS knows only in sums
+IN_SUMS = {ONE_SIDED: ("chamber_height", "gap", "base_thickness"), TWISTING: ("chamber_height", "gap", "roof")}
 #: of a normal pitch; lengths that are smaller, or negative, count as this
 SMALLEST = 1e-3
 #: of a ratio whose logarithm is taken; and part of the gap over which walls come to touch
@@ -65,6 +67,12 @@ class Coordinates:
         # not out=: numpy's logarithm into strided memory differs in the last bit with where that memory happens to lie
         x[:, 1:-2] = np.log(self._lengths(shape))
         return x
+
+    def ranged(self, shape, pressure, level):
+        """(n, r) what the training designs' ranges are told of: the inputs, and the logarithms of the lengths that those know only in
+        sums."""
+        apart = np.log(np.maximum(shape[:, [SHAPE.index(name) for name in IN_SUMS[self.kind]]], SMALLEST))
+        return np.hstack([self.inputs(shape, pressure, level), apart])
 
     def path_inputs(self, shape, lead, level, overlap):
         """(n, d + 1) the same with the leading strain (n,) in the place of the pressure, and `overlap_input` (n,)."""
@@ -139,13 +147,14 @@ class Coordinates:
     @property
     def names(self):
         """What `told` gives."""
-        lengths = [f"{name} / normal pitch" for name in LENGTHS[self.kind]]
-        return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh"]
+        lengths, apart = ([f"{name} / normal pitch" for name in names] for names in (LENGTHS[self.kind], IN_SUMS[self.kind]))
+        return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh", *apart]
 
-    def told(self, inputs):
-        """(d,) inputs (d,) as a user knows them: degrees, ratios."""
-        angle = np.degrees(np.arccos(np.sqrt(inputs[0])))
-        return np.array([angle, *np.exp(inputs[1:-2]), max(np.exp(inputs[-2]) - SMALL_PRESSURE, 0.0), inputs[-1]])
+    def told(self, ranged):
+        """(r,) `ranged` (r,) as a user knows it: degrees, ratios."""
+        squared_cosine, lengths, pressure, level, apart = np.split(ranged, [1, *(1 + len(LENGTHS[self.kind]) + np.arange(3))])
+        angle = np.degrees(np.arccos(np.sqrt(squared_cosine)))
+        return np.concatenate([angle, np.exp(lengths), np.maximum(np.exp(pressure) - SMALL_PRESSURE, 0), level, np.exp(apart)])
 
     # ---- free strains
     @cached_property

@@ -195,6 +195,8 @@ def test_it_says_when_it_is_asked_outside_and_by_how_much(trained):
     assert law.excess(segment, 0.2).max() > law.excess(segment, 0.15).max() > 0
     wide = replace(segment, width=40.0)
     assert any("width / normal pitch = 10 is outside" in text for text in law.doubts(wide, 0.01))
+    thin = replace(segment, base_thickness=0.4, channel_height=2.6, cavity_floor=1.3)  # the core is as high as before
+    assert any("base_thickness / normal pitch = 0.1 is outside" in text for text in law.doubts(thin, 0.01))
     other = design(ONE_SIDED, material=Yeoh(c10=0.125, c20=0.01))
     assert any("neo-Hookean" in text for text in law.doubts(other, 0.05))
     with pytest.raises(InputError, match="knows one-sided segments only: take --law analytic"):
