@@ -18,11 +18,10 @@ from reduced.comparing import compare_laws, curve_table, law_table, learning_cur
 from reduced.fit_law import FOLDS, fit_kind, fit_path, fit_stiffness
 from reduced.judging import figures, finest_mesh, further_angles, misses
 from reduced.law import RodLaw, read_law, write_law
-from reduced.law_coordinates import cosine
 from reduced.states import folds, sample_of, splits
 
-#: of `designs_at_further_angles`
-FURTHER_PARTS = 5
+#: of `designs_at_further_angles`: parts, and the least degrees that they lie further out
+FURTHER_PARTS, FURTHER_BY = 5, 1.0
 
 
 def samples_of(data, say=lambda text: None):
@@ -132,10 +131,10 @@ def judge_free_states_again(law, learned, judged):
 
 
 def designs_at_further_angles(training, held_out):
-    """[(what a law learns from, what it is judged on)]: the training designs that are more slanted than any held-out one, as edge designs
-    may be, in parts; [] where they are few."""
-    slant, most = np.abs(cosine(training.free.shape)), np.abs(cosine(held_out.free.shape)).max()
-    further = np.unique(training.free.design[slant > most])
+    """[(what a law learns from, what it is judged on)]: the training designs that are clearly more slanted than any held-out one, as edge
+    designs may be, in parts; [] where they are few."""
+    slant, most = (np.abs(90 - sample.free.shape[:, 0]) for sample in (training, held_out))
+    further = np.unique(training.free.design[slant > most.max() + FURTHER_BY])
     parts = folds(further, FURTHER_PARTS) if len(further) >= 2 * FURTHER_PARTS else []
     return [(training.of(np.setdiff1d(training.designs, part)), training.of(part)) for part in parts]
 

@@ -17,7 +17,7 @@ from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
 from reduced.states import sample_of
 from reduced.suggestion import most_telling
-from reduced.training import designs_at_further_angles, judge_free_states_again, run_training, samples_of
+from reduced.training import FURTHER_BY, designs_at_further_angles, judge_free_states_again, run_training, samples_of
 
 SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
@@ -176,7 +176,7 @@ def test_designs_more_slanted_than_the_held_out_ones_are_judged_by_laws_that_hav
     data = made_up_data()
     training, held_out = samples_of(replace(data, held_out=data.held_out & (data.shape[:, 0] > 60)))[ONE_SIDED]
     pairs = designs_at_further_angles(training, held_out)
-    further = training.free.design[training.free.shape[:, 0] < held_out.free.shape[:, 0].min()]
+    further = training.free.design[training.free.shape[:, 0] < held_out.free.shape[:, 0].min() - FURTHER_BY]
     assert np.array_equal(np.sort(np.concatenate([judged.designs for _, judged in pairs])), np.unique(further)) and len(pairs) == 5
     for learned, judged in pairs:
         assert np.array_equal(np.union1d(learned.designs, judged.designs), training.designs)
