@@ -110,7 +110,7 @@ def read_campaign(path):
                 index = first + position
                 judge = not at_edges and is_held_out(index, held_out_every)
                 for mesh in meshes:
-                    if mesh.every == 1 or index % mesh.every == 0 and (at_edges or index < count):
+                    if mesh.every == 1 or index % mesh.every == 0 and index < count:
                         settings = common | {"slopes": mesh.slopes and not judge}
                         case = _case(kind, index, mesh, bodies[position], states[position][: mesh.prescribed_of(index)], settings)
                         designs.append(Design(kind, index, mesh, judge, bodies[position], case))

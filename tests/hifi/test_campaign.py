@@ -30,12 +30,14 @@ def test_more_designs_keep_the_first_ones(tmp_path):
 
 
 def test_edge_designs_are_further_ones_that_lie_further_out_and_train_the_law(tmp_path):
-    plain = "designs = 6\nkinds = ['twisting']\nheld_out_every = 3\n"
-    few, many = (campaign(tmp_path, plain + f"edge_designs = {n}\n[edge_ranges.twisting]\nangle_deg = [30, 90]") for n in (3, 64))
-    ordinary = campaign(tmp_path, plain).designs
-    assert many.designs[:6] == ordinary and [d.index for d in many.designs[6:]] == [*range(EDGES, EDGES + 64)]
+    plain, fine = "designs = 6\nkinds = ['twisting']\nheld_out_every = 3\n", "[[mesh]]\nname = 'fine'\nmesh_size_mm = 1\nevery = 5\n"
+    meshes = "[[mesh]]\nname = 'coarse'\nmesh_size_mm = 2\n" + fine + "[edge_ranges.twisting]\nangle_deg = [30, 90]"
+    few, many = (campaign(tmp_path, plain + f"edge_designs = {n}\n" + meshes) for n in (3, 64))
+    ordinary = campaign(tmp_path, plain + meshes).designs
+    # fine meshes are for every fifth of the first six
+    assert many.designs[:8] == ordinary and [d.index for d in many.designs[8:]] == [*range(EDGES, EDGES + 64)]
     assert {d.case.name for d in few.designs} < {d.case.name for d in many.designs}
-    edges = many.designs[6:]
+    edges = many.designs[8:]
     assert not any(d.held_out for d in edges)
     for name, low, high in (("width", 8.0, 16.0), ("angle", 30.0, 90.0)):
         places = np.array([(getattr(d.segment, name) - low) / (high - low) for d in edges])
