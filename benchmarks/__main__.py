@@ -77,6 +77,10 @@ MEANING = {
     "law_stiffness_p95_rel": "the same designs: largest |1 - eigenvalue| of K_FE^-1 K, 95th percentile",
     "law_force_p95_rel": "the same designs at twice the free strains: error of the forces, whitened by K_FE, 95th percentile",
     "law_interval_coverage_90": "the same designs: share of free strains within their 90 % intervals, of the kind that is further from 0.9",
+    "slanted_strain_median_rel": "law, designs at 30 .. 40 deg, beyond the angles that it knows, the worse kind and band: strains, median",
+    "slanted_strain_p95_rel": "the same, 95th percentile",
+    "slanted_tip100_p95_rel": "the same: tips of free segments of 100 mm",
+    "slanted_stiffness_p95_rel": "the same: stiffness",
     "law_batch_10k_seconds": "free strains and their slopes of 10,000 (design, pressure), the dearer kind: best CPU s",
     "law_single_us": "free strains of one segment at one pressure, the dearer kind: best CPU us",
     "law_real_silicone_strain_rel_01": "cells of fitted silicones (Yeoh) against neo-Hookean ones of the same initial modulus: largest "

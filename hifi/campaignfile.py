@@ -79,8 +79,8 @@ def read_campaign(path):
     kinds = data.get("kinds", list(KINDS))
     if not isinstance(kinds, list) or not kinds or any(k not in KINDS for k in kinds):
         raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting'")
-    count = value("designs", 250, 1, 100_000, integer=True)
     edges = value("edge_designs", 0, 0, 100_000, integer=True)
+    count = value("designs", 250, 0 if edges else 1, 100_000, integer=True)
     seed = value("seed", 1, 0, 2**31, integer=True)
     held_out_every = value("held_out_every", 5, 2, 1000, integer=True)
     common = {
