@@ -82,6 +82,8 @@ MEANING = {
     "slanted_tip100_p95_rel": "the same: tips of free segments of 100 mm",
     "slanted_stiffness_p95_rel": "the same: stiffness",
     "law_batch_10k_seconds": "free strains and their slopes of 10,000 (design, pressure), the dearer kind: best CPU s",
+    "law_error_bars_10k_seconds": "90 % intervals of the same free strains: best CPU s",
+    "law_stiffness_10k_seconds": "free strains of the same with their tangent stiffness: best CPU s",
     "law_single_us": "free strains of one segment at one pressure, the dearer kind: best CPU us",
     "law_real_silicone_strain_rel_01": "cells of fitted silicones (Yeoh) against neo-Hookean ones of the same initial modulus: largest "
     "difference of the free strains at P/mu = 0.1 over their norm",

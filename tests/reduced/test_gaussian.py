@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reduced import gaussian
 from reduced.along_inputs import AlongInputs
-from reduced.gaussian import NEAR, TREND, Slopes, _misfit, _spread_over, fit
+from reduced.gaussian import JITTER, NEAR, TREND, Slopes, _misfit, _spread_over, fit
 
 
 def observed(n, seed=0):
@@ -71,6 +72,31 @@ def test_slopes_are_followed_and_spare_observations():
     errors = [np.sqrt(((p(new) - truth) ** 2).mean()) for p in (process, without)]
     assert errors[0] < 0.3 * errors[1], errors
     assert (process.deviation(new).mean(axis=0) < without.deviation(new).mean(axis=0)).all()
+
+
+def test_the_deviation_is_what_observations_and_slopes_leave_of_the_weights(monkeypatch):
+    """Against the normal equations of the weights, with the slopes' rows from differences."""
+    monkeypatch.setattr(gaussian, "MANY_ROWS", 5)
+    x, y, _ = observed(12)
+    slopes = Slopes(np.arange(12), np.random.default_rng(3).normal(size=(12, 2)), np.ones((12, 2)))
+    found = fit(x, y, np.arange(12), slopes=slopes)
+    noises = {"noise": 1e-3, "common_noise": 2e-3, "slope_noise": 5e-3}
+    process = fit(x, y, np.arange(12), slopes=slopes, like=replace(found, metric=np.diag([1.0, 0.5]), **noises))
+
+    def basis(z):
+        kernel = np.exp(-0.5 * (((z[:, None] - process.inducing) @ process.metric) ** 2).sum(axis=2))
+        return np.hstack([kernel, np.ones((len(z), 1)), z])
+
+    z, h, m = (x - process.shift) / process.width, 1e-5, len(process.inducing)
+    steep = (basis(z + h * process.ways) - basis(z - h * process.ways)) / (2 * h)
+    prior = np.zeros((m + 3, m + 3))
+    prior[:m, :m], prior[m:, m:] = basis(process.inducing)[:, :m] + JITTER * np.eye(m), np.eye(3) / TREND
+    told = basis(z).T @ basis(z) / (1e-3 + 2e-3) + steep.T @ steep / 5e-3 + prior
+    new = observed(9, seed=1)[0]
+    rows = basis((new - process.shift) / process.width)
+    missed = 1 - np.einsum("ni,ij,nj->n", rows[:, :m], np.linalg.inv(prior[:m, :m]), rows[:, :m])
+    spread = np.einsum("ni,ij,nj->n", rows, np.linalg.inv(told), rows) + missed
+    assert process.deviation(new) ** 2 / process.variance == pytest.approx(np.column_stack([spread, spread]), rel=1e-3, abs=1e-6)
 
 
 def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():
