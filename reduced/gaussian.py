@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cholesky, lapack, qr, solve_triangular
+from scipy.linalg import block_diag, cholesky, lapack, qr, solve_triangular
 from scipy.optimize import minimize
 
 #: prior variance of the plane's coefficients over that of the smooth function
@@ -130,8 +130,7 @@ class GaussianProcess:
         # dot: for a few rows it takes a third of the time of @
         out, d = (x - self.shift).dot(slopes), len(slopes)
         out += at_shift
-        a = out[:, :d]
-        out[:, d + 1] = (a * a).dot(halves)
+        out[:, d + 1] = (out[:, :d] ** 2).dot(halves)
         return out
 
     def kernels(self, linear):
@@ -141,7 +140,7 @@ class GaussianProcess:
 
     @cached_property
     def _kernel_root(self):
-        return cholesky(_kernel(self.points, self.points) + JITTER * np.eye(len(self.points)), lower=True)
+        return _kernel_root(self.points)
 
     def _in_prior(self, rows):
         """(m + 1 + d, n) of rows (n, m + 1 + d) as `_value_rows` gives them, by weights in units of their prior's deviation."""
@@ -158,9 +157,8 @@ class GaussianProcess:
         values = _whitener(self.group, self.common_noise / self.noise)(trust[:, None] * values)
         total = self.noise * np.eye(len(self.weights)) + values.T @ values
         for start in range(0, len(self.at), MANY_ROWS):
-            some = slice(start, start + MANY_ROWS)
-            at = self.at[some]
-            slopes = self._in_prior(_slope_rows(self.observed[at], self.ways[some], spots, metric)) * trust[at]
+            at, ways = (a[start : start + MANY_ROWS] for a in (self.at, self.ways))
+            slopes = self._in_prior(_slope_rows(self.observed[at], ways, spots, metric)) * trust[at]
             total += self.noise / self.slope_noise * (slopes @ slopes.T)
         return cholesky(total, lower=True)
 
@@ -207,6 +205,11 @@ def _columns(b):
 def _kernel(a, b):
     k = np.column_stack([a, np.ones(len(a)), (a * a).sum(axis=1) / -2]) @ _columns(b)
     return np.exp(k, out=k)
+
+
+def _kernel_root(points):
+    """(m, m) lower factor of the kernels among points (m, e)."""
+    return cholesky(_kernel(points, points) + JITTER * np.eye(len(points)), lower=True)
 
 
 def _value_rows(z, spots, metric):
@@ -304,9 +307,7 @@ class _System:
         noise, common_noise, slope_noise = noises
         self._values, self._slopes = _value_rows(z, spots, metric), _slope_rows(z[at], ways, spots, metric)
         self._at, self._weight = at, np.sqrt(noise / slope_noise)
-        points, m, size = spots @ metric, len(spots), self._values.shape[1]
-        self.prior = np.eye(size) / np.sqrt(TREND)
-        self.prior[:m, :m] = cholesky(_kernel(points, points) + JITTER * np.eye(m), lower=True).T
+        self.prior = block_diag(_kernel_root(spots @ metric).T, np.eye(1 + z.shape[1]) / np.sqrt(TREND))
         self._white, self._noise = _whitener(group, common_noise / noise), noise
 
     def rows(self, trust):
