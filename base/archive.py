@@ -19,12 +19,15 @@ def write_archive(path, schema, about, arrays, compress=False):
 
 @contextmanager
 def read_archive(path, schema, what, command):
-    """Yields (about, stored arrays by name). InputError when the file is no `what`, as `command` makes it, of this schema."""
+    """Yields (about, stored arrays by name). InputError when the file is no `what`, as `command` makes it, of
+    this schema."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             about = json.loads(bytes(stored["about"]))
             if about.get("schema") != schema:
-                raise InputError(f"{path}: schema '{about.get('schema')}' is not '{schema}': make it again with {command}")
+                raise InputError(
+                    f"{path}: schema '{about.get('schema')}' is not '{schema}': make it again with {command}"
+                )
             yield about, stored
     except InputError:  # a ValueError too
         raise

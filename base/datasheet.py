@@ -8,15 +8,37 @@ from base.dataset import SCHEMA
 def datasheet(data):
     """Markdown text on CellData."""
     about = data.about
-    lines = ["# Data set of unit cells", "", f"Schema {SCHEMA}, made by `pneunet campaign` at revision {', '.join(about['revisions'])}."]
-    lines += ["", "| campaign | |", "|---|---|", *(f"| {key} | {value} |" for key, value in about["campaign"].items())]
+    lines = [
+        "# Data set of unit cells",
+        "",
+        f"Schema {SCHEMA}, made by `pneunet campaign` at revision {', '.join(about['revisions'])}.",
+    ]
+    lines += [
+        "",
+        "| campaign | |",
+        "|---|---|",
+        *(f"| {key} | {value} |" for key, value in about["campaign"].items()),
+    ]
     for k, kind in enumerate(about["kinds"]):
-        lines += ["", f"## {kind}", "", *_counts(data, k), "", *_ranges(data, k), "", *_quality(data, k), *_failures(data, k)]
+        lines += [
+            "",
+            f"## {kind}",
+            "",
+            *_counts(data, k),
+            "",
+            *_ranges(data, k),
+            "",
+            *_quality(data, k),
+            *_failures(data, k),
+        ]
     return "\n".join(lines) + "\n"
 
 
 def _counts(data, k):
-    yield "| mesh | cases | accepted | held out | free states | prescribed states | limit load met | walls touch | CPU hours |"
+    yield (
+        "| mesh | cases | accepted | held out | free states | prescribed states | limit load met | walls"
+        " touch | CPU hours |"
+    )
     yield "|---|---|---|---|---|---|---|---|---|"
     for m, mesh in enumerate(data.about["meshes"]):
         rows = (data.kind == k) & (data.mesh == m)
@@ -25,7 +47,10 @@ def _counts(data, k):
             continue
         share = data.accepted[rows].mean()
         numbers = [
-            f"{mesh['name']} ({', '.join(f'{key} {value:g}' for key, value in mesh.items() if key != 'name')})",
+            (
+                f"{mesh['name']}"
+                f" ({', '.join(f'{key} {value:g}' for key, value in mesh.items() if key != 'name')})"
+            ),
             rows.sum(),
             f"{data.accepted[rows].sum()} ({share:.1%})",
             (rows & data.held_out).sum(),
@@ -71,7 +96,9 @@ def _quality(data, k):
     ):
         values = values[np.isfinite(values)]
         if len(values):
-            yield f"| {name} | {np.median(values):.2g} | {np.percentile(values, 95):.2g} | {values.max():.2g} |"
+            yield (
+                f"| {name} | {np.median(values):.2g} | {np.percentile(values, 95):.2g} | {values.max():.2g} |"
+            )
 
 
 def _failures(data, k):
@@ -83,9 +110,14 @@ def _failures(data, k):
     yield ""
     for row in rejected:
         status = data.about["statuses"][data.status[row]]
-        reason = data.about["reasons"].get(str(row), f"symmetry defect {data.symmetry_defect[row]:.1%}, or an unstable free state")
+        reason = data.about["reasons"].get(
+            str(row), f"symmetry defect {data.symmetry_defect[row]:.1%}, or an unstable free state"
+        )
         place = ", ".join(f"{name} {value:.3g}" for name, value in zip(data.about["shape"], data.shape[row]))
-        yield f"- design {data.design[row]} ({data.about['meshes'][data.mesh[row]]['name']}): {status}: {reason} ({place})"
+        yield (
+            f"- design {data.design[row]} ({data.about['meshes'][data.mesh[row]]['name']}): {status}:"
+            f" {reason} ({place})"
+        )
     yield ""
     yield "| mean over | all | not accepted |"
     yield "|---|---|---|"

@@ -6,4 +6,5 @@ class InputError(ValueError):
 
 
 class ConvergenceError(RuntimeError):
-    """A computation stopped short: says at which load, why and what to try. Accepted results are on disk already."""
+    """A computation stopped short: says at which load, why and what to try. Accepted results are on disk
+    already."""

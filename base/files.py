@@ -14,7 +14,8 @@ from base.errors import InputError
 
 @contextmanager
 def atomic_path(path):
-    """A temporary path beside `path` to write to; renamed onto it when the block ends without an exception."""
+    """A temporary path beside `path` to write to; renamed onto it when the block ends without an
+    exception."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
@@ -68,7 +69,9 @@ def read_columns(path, columns):
             try:
                 out[i, j] = float(row[header.index(column)])
             except (ValueError, IndexError):
-                raise InputError(f"{path} row {i + 2}: '{column}' is not a number: make the file again") from None
+                raise InputError(
+                    f"{path} row {i + 2}: '{column}' is not a number: make the file again"
+                ) from None
     return out
 
 
@@ -80,12 +83,15 @@ def output_directory(path):
         with tempfile.NamedTemporaryFile(dir=path):
             pass
     except OSError as error:
-        raise InputError(f"{path}: cannot be written to ({error.strerror}): choose another folder with -o") from None
+        raise InputError(
+            f"{path}: cannot be written to ({error.strerror}): choose another folder with -o"
+        ) from None
     return path
 
 
 def require_writable(path):
-    """InputError when `path` could not be made or written to; makes nothing itself, for use before long work."""
+    """InputError when `path` could not be made or written to; makes nothing itself, for use before long
+    work."""
     existing = Path(path).absolute()
     while not existing.exists():
         existing = existing.parent

@@ -1,4 +1,5 @@
-"""`pneunet fit-material`: from a tensile test to a [material] table, a picture and a word on how far to trust it."""
+"""`pneunet fit-material`: from a tensile test to a [material] table, a picture and a word on how far to trust
+it."""
 
 from pathlib import Path
 
@@ -17,10 +18,11 @@ CREDIBLE = 0.1
 
 
 def run_fit(path, law="all", directory=None, stress_unit=None, largest_strain=np.inf, say=print):
-    """Fit `law` (a name of base.materials.LAWS, any case, or "all") to the tests in `path`; returns the chosen Fit.
+    """Fit `law` (a name of base.materials.LAWS, any case, or "all") to the tests in `path`; returns the
+    chosen Fit.
 
-    Writes material.toml and fit.png to `directory` (default out/fit-STEM). largest_strain: fit no further than this
-    engineering strain. With "all" the least error without instability is chosen.
+    Writes material.toml and fit.png to `directory` (default out/fit-STEM). largest_strain: fit no further
+    than this engineering strain. With "all" the least error without instability is chosen.
     """
     path = Path(path)
     names = {name.lower(): name for name in LAWS}
@@ -53,23 +55,33 @@ def run_fit(path, law="all", directory=None, stress_unit=None, largest_strain=np
     shown = list(fits.values()) if law.lower() == "all" else [chosen]
     draw(directory / "fit.png", path.stem, specimens, tests, shown, chosen, credible)
     count = f"{len(specimens)} specimen{'s' * (len(specimens) > 1)}"
-    say(f"{path.name}: {count}, fitted to stretch {tests.largest:.2f}, break at {100 * elongation:.0f} % strain")
+    say(
+        f"{path.name}: {count}, fitted to stretch {tests.largest:.2f}, break at {100 * elongation:.0f} %"
+        " strain"
+    )
     for f in shown:
-        say(f"{'-> ' if f is chosen else '   '}{f.material.law:14s} error {100 * f.error:5.1f} %   {parameters(f.material)}")
+        say(
+            f"{'-> ' if f is chosen else '   '}{f.material.law:14s} error {100 * f.error:5.1f} %  "
+            f" {parameters(f.material)}"
+        )
     for warning in chosen.warnings:
         say(f"warning: {warning}")
     if not any(s.broke for s in specimens):
-        say("warning: no fall of the stress is seen: if the test stopped before break, take elongation_at_break_percent out")
+        say(
+            "warning: no fall of the stress is seen: if the test stopped before break, take"
+            " elongation_at_break_percent out"
+        )
     say(
-        f"warning: uniaxial data alone: at equibiaxial stretch {stretch:.2g} the {len(credible)} laws that fit predict "
-        f"{low:.4g}..{high:.4g} MPa"
+        f"warning: uniaxial data alone: at equibiaxial stretch {stretch:.2g} the {len(credible)} laws that"
+        f" fit predict {low:.4g}..{high:.4g} MPa"
     )
     say(f"written: {directory / 'material.toml'}, fit.png")
     return chosen
 
 
 def best(fits):
-    """Least error among fits that are stable and likely in equibiaxial tension; among all if there is none."""
+    """Least error among fits that are stable and likely in equibiaxial tension; among all if there is
+    none."""
     stable = [f for f in fits if not any(w.startswith(("unstable", "unlikely")) for w in f.warnings)]
     return min(stable or fits, key=lambda f: f.error)
 
@@ -82,7 +94,8 @@ def parameters(material):
 
 
 def draw(path, title, specimens, tests, shown, chosen, credible):
-    """Data and fits, residuals, and what the laws say of equibiaxial tension; nominal stress against stretch."""
+    """Data and fits, residuals, and what the laws say of equibiaxial tension; nominal stress against
+    stretch."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -90,7 +103,11 @@ def draw(path, title, specimens, tests, shown, chosen, credible):
 
     figure = Figure(figsize=(11, 5.2), layout="constrained")
     grid = figure.add_gridspec(2, 2, height_ratios=(3, 1))
-    fitted, residual, biaxial = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[:, 1])
+    fitted, residual, biaxial = (
+        figure.add_subplot(grid[0, 0]),
+        figure.add_subplot(grid[1, 0]),
+        figure.add_subplot(grid[:, 1]),
+    )
     for s in specimens:
         near = s.stretch <= 1 + 1.15 * (tests.largest - 1)
         fitted.plot(s.stretch[near], s.stress[near], ".", color="0.6", markersize=3)
@@ -99,7 +116,11 @@ def draw(path, title, specimens, tests, shown, chosen, credible):
     def style(f):
         i = list(LAWS).index(f.material.law)
         # dashed in turn: a law may hide another that it contains
-        return {"color": f"C{i}", "linewidth": 2.2 if f is chosen else 1.3, "linestyle": "-" if i % 2 == 0 else (i, (4, 3))}
+        return {
+            "color": f"C{i}",
+            "linewidth": 2.2 if f is chosen else 1.3,
+            "linestyle": "-" if i % 2 == 0 else (i, (4, 3)),
+        }
 
     l = np.linspace(1.0, tests.largest, 300)
     for f in shown:
@@ -117,7 +138,11 @@ def draw(path, title, specimens, tests, shown, chosen, credible):
     biaxial.set_ylim(0, 2 * np.nanmax(nominal_stress(chosen.material, "equibiaxial", l[: int(0.9 * len(l))])))
     fitted.set(title=f"{title}: uniaxial test and fit", ylabel="nominal stress, MPa", ylim=(0, None))
     residual.set(xlabel="stretch", ylabel="law - test, kPa", xlim=fitted.get_xlim())
-    biaxial.set(title="equibiaxial tension, not tested: what the laws say", xlabel="stretch", ylabel="nominal stress, MPa")
+    biaxial.set(
+        title="equibiaxial tension, not tested: what the laws say",
+        xlabel="stretch",
+        ylabel="nominal stress, MPa",
+    )
     fitted.legend(title="law, relative RMS error")
     biaxial.legend()
     with atomic_path(path) as temporary:

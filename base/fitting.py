@@ -1,7 +1,8 @@
 """Fit a law to uniaxial tests, and say how far the fit is to be trusted.
 
-Nominal stress is linear in a law's moduli once jm (Gent) or the exponents (Ogden) are fixed, so the moduli are found by
-linear least squares with lower bounds of zero (which keep every law but Yeoh's stable), and the rest by a search around them.
+Nominal stress is linear in a law's moduli once jm (Gent) or the exponents (Ogden) are fixed, so the moduli
+are found by linear least squares with lower bounds of zero (which keep every law but Yeoh's stable), and the
+rest by a search around them.
 """
 
 from dataclasses import dataclass
@@ -15,11 +16,13 @@ from base.errors import InputError
 from base.hyperelastic import MODES, nominal_stress, stable_stretch
 from base.materials import LAWS, Ogden
 
-#: Ogden's exponents: bounds, and where to start. Below -2 (Mooney-Rivlin's second term) the uniaxial curve hardly sees the
-#: exponent, while the equibiaxial stress grows as l^(-2 alpha): fits there predicted it wrong by a factor of a hundred.
+#: Ogden's exponents: bounds, and where to start. Below -2 (Mooney-Rivlin's second term) the uniaxial curve
+#: hardly sees the exponent, while the equibiaxial stress grows as l^(-2 alpha): fits there predicted it wrong
+#: by a factor of a hundred.
 LOWEST_EXPONENT, HIGHEST_EXPONENT = -2.0, Ogden.largest_exponent
 EXPONENTS = (-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
-#: equibiaxial over uniaxial nominal stress at the same stretch, up to 2: neo-Hookean 1.1, measured on rubbers up to about 2
+#: equibiaxial over uniaxial nominal stress at the same stretch, up to 2: neo-Hookean 1.1, measured on rubbers
+#: up to about 2
 LARGEST_RATIO = 2.5
 #: largest jm: beyond it Gent's law is the neo-Hookean one
 LARGEST_JM = 1e5
@@ -27,8 +30,8 @@ LARGEST_JM = 1e5
 
 @dataclass(frozen=True)
 class Fit:
-    """material: the law with its parameters; error: root mean square of the stress error over that of the stress;
-    warnings: why not to trust it, each one line."""
+    """material: the law with its parameters; error: root mean square of the stress error over that of the
+    stress; warnings: why not to trust it, each one line."""
 
     material: object
     error: float
@@ -42,7 +45,11 @@ class TensileData:
         stretch, stress, weight = [], [], []
         for s in specimens:
             use = np.flatnonzero(s.stretch - 1 <= largest_strain)
-            use = use[np.unique(np.linspace(0, len(use) - 1, min(200, len(use))).astype(int))] if len(use) else use
+            use = (
+                use[np.unique(np.linspace(0, len(use) - 1, min(200, len(use))).astype(int))]
+                if len(use)
+                else use
+            )
             stretch.append(s.stretch[use])
             stress.append(s.stress[use])
             weight.append(np.full(len(use), 1 / np.sqrt(max(len(use), 1))))
@@ -54,10 +61,14 @@ class TensileData:
 
     def error(self, material):
         """Relative root mean square error of the nominal stress."""
-        return float(np.linalg.norm(self.weight * (nominal_stress(material, "uniaxial", self.stretch) - self.stress)) / self.size)
+        return float(
+            np.linalg.norm(self.weight * (nominal_stress(material, "uniaxial", self.stretch) - self.stress))
+            / self.size
+        )
 
     def moduli(self, law, names, free=(), **fixed):
-        """({name: MPa}, relative error) of the best moduli >= 0 (any sign for those in `free`), the rest `fixed`."""
+        """({name: MPa}, relative error) of the best moduli >= 0 (any sign for those in `free`), the rest
+        `fixed`."""
         signs = [(name, 1.0) for name in names] + [(name, -1.0) for name in free]
         columns = []
         for name, sign in signs:
@@ -82,7 +93,11 @@ def _gent(tests):
 
     grid = lowest * np.geomspace(1, LARGEST_JM / lowest, 60)
     start = np.log(grid[np.argmin([parameters(jm)[1] for jm in grid])])
-    x = minimize(lambda x: parameters(np.exp(np.clip(x[0], np.log(lowest), np.log(LARGEST_JM))))[1], [start], method="Nelder-Mead").x
+    x = minimize(
+        lambda x: parameters(np.exp(np.clip(x[0], np.log(lowest), np.log(LARGEST_JM))))[1],
+        [start],
+        method="Nelder-Mead",
+    ).x
     jm = float(np.exp(np.clip(x[0], np.log(lowest), np.log(LARGEST_JM))))
     return parameters(jm)[0] | {"jm": jm}
 
@@ -101,7 +116,10 @@ def _ogden(tests):
     best = []
     for terms in (1, 2, 3):
         starts = sorted(combinations(EXPONENTS, terms), key=lambda a: solve(a)[1])[:3]
-        found = [minimize(lambda a: solve(a)[1], a, method="Nelder-Mead", options={"maxiter": 400}).x for a in starts]
+        found = [
+            minimize(lambda a: solve(a)[1], a, method="Nelder-Mead", options={"maxiter": 400}).x
+            for a in starts
+        ]
         best.append(min((solve(a) for a in found), key=lambda one: one[1]))
     enough = 1.1 * min(error for _, error in best) + 1e-9
     return next(parameters for parameters, error in best if error <= enough)
@@ -117,7 +135,8 @@ SEARCHES = {
 
 
 def fit(law, tests, **common):
-    """The Fit of one law to `TensileData`; `common`: density, name and the like. InputError when no usable law comes out."""
+    """The Fit of one law to `TensileData`; `common`: density, name and the like. InputError when no usable
+    law comes out."""
     parameters = {name: float(f"{value:.6g}") for name, value in SEARCHES[law](tests).items()}
     material = LAWS[law](**parameters, **common)
     return Fit(material, tests.error(material), tuple(_warnings(material, tests)))
@@ -128,14 +147,21 @@ def _warnings(material, tests):
     if reach < 1.3:
         yield f"the test reaches only {100 * (reach - 1):.0f} % strain: everything beyond is a guess"
     if error > 0.05:
-        yield f"the stress is off by {100 * error:.0f} % (root mean square): this law does not have the curve's shape"
+        yield (
+            f"the stress is off by {100 * error:.0f} % (root mean square): this law does not have the curve's"
+            " shape"
+        )
     early = tests.stretch <= min(1.5, 1 + 0.5 * (reach - 1))
     if early.sum() >= 3:
-        measured, told = tests.stress[early].sum(), nominal_stress(material, "uniaxial", tests.stretch[early]).sum()
+        measured, told = (
+            tests.stress[early].sum(),
+            nominal_stress(material, "uniaxial", tests.stretch[early]).sum(),
+        )
         if abs(told / measured - 1) > 0.15:
             yield (
-                f"up to {100 * (tests.stretch[early].max() - 1):.0f} % strain the law is {abs(100 * (told / measured - 1)):.0f} % too "
-                f"{'stiff' if told > measured else 'soft'}, where a robot mostly works: fit to less strain"
+                f"up to {100 * (tests.stretch[early].max() - 1):.0f} % strain the law is"
+                f" {abs(100 * (told / measured - 1)):.0f} % too {'stiff' if told > measured else 'soft'},"
+                " where a robot mostly works: fit to less strain"
             )
     for name in material.parameters:
         value = getattr(material, name)
@@ -148,11 +174,18 @@ def _warnings(material, tests):
     stretch = min(2.0, reach)
     ratio = nominal_stress(material, "equibiaxial", stretch) / nominal_stress(material, "uniaxial", stretch)
     if not ratio < LARGEST_RATIO:
-        yield f"unlikely in equibiaxial: {ratio:.2g} times the uniaxial stress at stretch {stretch:.2g}, where rubbers have 1.1 to 2"
+        yield (
+            f"unlikely in equibiaxial: {ratio:.2g} times the uniaxial stress at stretch {stretch:.2g}, where"
+            " rubbers have 1.1 to 2"
+        )
     for mode in MODES:
         limit = stable_stretch(material, mode, 1.5 * reach)
         if limit < np.inf:
-            where = "inside the test's range" if limit <= reach else f"just outside the test's range (stretch {reach:.3g})"
+            where = (
+                "inside the test's range"
+                if limit <= reach
+                else f"just outside the test's range (stretch {reach:.3g})"
+            )
             yield f"unstable in {mode} from stretch {limit:.3g} on, {where}"
 
 

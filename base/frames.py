@@ -6,10 +6,11 @@ from base import se3
 
 
 def best_rigid_fit(reference, deformed, weights):
-    """Pose (4, 4) of the rigid motion that carries `reference` points (n, 3) closest to `deformed` ones (n, 3).
+    """Pose (4, 4) of the rigid motion that carries `reference` points (n, 3) closest to `deformed` ones (n,
+    3).
 
-    Weighted least squares with `weights` (n,), e.g. areas in mm^2 (Kabsch, Acta Cryst. A 32, 922, 1976). The section
-    frame at undeformed arc length s is this motion applied to the frame at (s, 0, 0): `frame_at`.
+    Weighted least squares with `weights` (n,), e.g. areas in mm^2 (Kabsch, Acta Cryst. A 32, 922, 1976). The
+    section frame at undeformed arc length s is this motion applied to the frame at (s, 0, 0): `frame_at`.
     """
     reference, deformed, w = (np.asarray(a, float) for a in (reference, deformed, weights))
     moments = FitMoments.of(reference, deformed, w)
@@ -17,7 +18,8 @@ def best_rigid_fit(reference, deformed, weights):
 
 
 class FitMoments:
-    """Moments (16 numbers) that determine a best rigid fit; add them up over ranks or patches, then ask for the pose."""
+    """Moments (16 numbers) that determine a best rigid fit; add them up over ranks or patches, then ask for
+    the pose."""
 
     def __init__(self, values):
         self.values = np.asarray(values, float)
@@ -49,7 +51,8 @@ class FitMoments:
 
 
 def frame_at(motion, s):
-    """Section frames (..., 4, 4): `motion` (..., 4, 4) applied to the undeformed frame at (s, 0, 0), s in mm."""
+    """Section frames (..., 4, 4): `motion` (..., 4, 4) applied to the undeformed frame at (s, 0, 0), s in
+    mm."""
     undeformed = np.broadcast_to(np.eye(4), np.shape(motion)).copy()
     undeformed[..., 0, 3] = s
     return motion @ undeformed

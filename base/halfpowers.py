@@ -1,9 +1,10 @@
 """Ogden's law as a series in half powers of the principal stretches: smooth where stretches coincide.
 
-Derivatives of principal stretches are singular at repeated ones, F = I among them, but sum_i f(l_i) is not. With
-f(l) = sum_n w_n l^(n/2) over whole n from -ORDER to ORDER the sums are traces of whole powers of the square root of the
-stretch tensor; those are polynomials of its invariants, and no principal stretch is ever needed. Exact when 2 alpha is
-whole, else an interpolation with the relative error that `weights` bounds for stretches 1/RANGE..RANGE.
+Derivatives of principal stretches are singular at repeated ones, F = I among them, but sum_i f(l_i) is not.
+With f(l) = sum_n w_n l^(n/2) over whole n from -ORDER to ORDER the sums are traces of whole powers of the
+square root of the stretch tensor; those are polynomials of its invariants, and no principal stretch is ever
+needed. Exact when 2 alpha is whole, else an interpolation with the relative error that `weights` bounds for
+stretches 1/RANGE..RANGE.
 """
 
 import numpy as np
@@ -16,7 +17,8 @@ TOLERANCE = 1e-6
 
 
 def weights(terms):
-    """Weights (MPa) of l^(n/2), n = 1..ORDER, and then of l^(-n/2), shape (2 ORDER,), for terms ((mu_p, alpha_p), ...).
+    """Weights (MPa) of l^(n/2), n = 1..ORDER, and then of l^(-n/2), shape (2 ORDER,), for terms ((mu_p,
+    alpha_p), ...).
 
     Least squares for the slope l df/dl and its own slope (stress and tangent), relative to the terms' sizes.
     """
@@ -33,5 +35,8 @@ def weights(terms):
     solution = np.linalg.lstsq(matrix / scale, right, rcond=1e-15)[0] / scale
     error = np.abs(matrix @ solution - right).max()
     if error > TOLERANCE:
-        raise InputError(f"law = 'Ogden': exponents {', '.join(f'{a:g}' for _, a in terms)} are too large for finite elements")
+        raise InputError(
+            f"law = 'Ogden': exponents {', '.join(f'{a:g}' for _, a in terms)} are too large for finite"
+            " elements"
+        )
     return solution

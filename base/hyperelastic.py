@@ -1,14 +1,17 @@
-"""What a law answers to homogeneous stretch, in closed form: incompressible, in numpy, for any law of base.materials.
+"""What a law answers to homogeneous stretch, in closed form: incompressible, in numpy, for any law of
+base.materials.
 
-Everything comes from the slopes s_i = l_i dW/dl_i of the energy of principal stretches: the Cauchy stress of an
-incompressible solid is s_i - p, and a free direction gives p. `material` is any object with a law's parameters.
+Everything comes from the slopes s_i = l_i dW/dl_i of the energy of principal stretches: the Cauchy stress of
+an incompressible solid is s_i - p, and a free direction gives p. `material` is any object with a law's
+parameters.
 """
 
 import numpy as np
 
 
 def _invariant_slopes(derivatives):
-    """Slopes of a law W(I1, I2): s_i = 2 (W1 l_i^2 - W2 / l_i^2); `derivatives(material, I1, I2)` gives W1, W2."""
+    """Slopes of a law W(I1, I2): s_i = 2 (W1 l_i^2 - W2 / l_i^2); `derivatives(material, I1, I2)` gives W1,
+    W2."""
 
     def slopes(m, l):
         squares = l * l
@@ -72,8 +75,8 @@ def shear_stress(material, amount):
 def stable_stretch(material, mode, largest=10.0):
     """The stretch at which the law stops being stable in this mode; inf when it is stable up to `largest`.
 
-    Drucker: the Hessian of W in the two free logarithmic strains is positive definite, so that any further stretch costs
-    work. Gent's law counts as stable up to its limit.
+    Drucker: the Hessian of W in the two free logarithmic strains is positive definite, so that any further
+    stretch costs work. Gent's law counts as stable up to its limit.
     """
     l = np.geomspace(1.001, largest, 400)
     e = np.log(MODES[mode](l))

@@ -1,8 +1,10 @@
-"""How poses exp(X) change with their twists: the left Jacobian of SE(3) and its derivative, as polynomials in ad.
+"""How poses exp(X) change with their twists: the left Jacobian of SE(3) and its derivative, as polynomials in
+ad.
 
-Twists are (rotation, translation) and wrenches (moment, force), as in base.se3. With ad the 6x6 matrix of the commutator,
-J = sum ad^n/(n+1)!; as ad^5 = -2 t ad^3 - t^2 ad with t = |w|^2 the sum ends at ad^4, with coefficients that are entire functions of t
-(closed forms: Barfoot & Furgale, IEEE Trans. Robotics 30, 2014; here their power series, which have no special case at t = 0).
+Twists are (rotation, translation) and wrenches (moment, force), as in base.se3. With ad the 6x6 matrix of the
+commutator, J = sum ad^n/(n+1)!; as ad^5 = -2 t ad^3 - t^2 ad with t = |w|^2 the sum ends at ad^4, with
+coefficients that are entire functions of t (closed forms: Barfoot & Furgale, IEEE Trans. Robotics 30, 2014;
+here their power series, which have no special case at t = 0).
 """
 
 from math import factorial
@@ -15,7 +17,8 @@ TERMS = 16  # exact to rounding for turns up to 4 rad
 
 
 def _series():
-    """(TERMS, 8) coefficients of the powers of t in a1..a4 of J = 1 + a1 ad + .. + a4 ad^4, and in their derivatives by t."""
+    """(TERMS, 8) coefficients of the powers of t in a1..a4 of J = 1 + a1 ad + .. + a4 ad^4, and in their
+    derivatives by t."""
     j = range(1, TERMS + 1)
     first = [(-1) ** (i + 1) * (2 - i) / factorial(2 * i) for i in j]
     second = [(-1) ** i * (i - 2) / factorial(2 * i + 1) for i in j]
@@ -57,7 +60,8 @@ def wrench_commutator(wrench):
 
 
 class LeftJacobian:
-    """matrix: J (n, 6, 6) of twists (n, 6), d exp(X) = hat_pose(J dX) exp(X); exact to rounding for turns up to 4 rad."""
+    """matrix: J (n, 6, 6) of twists (n, 6), d exp(X) = hat_pose(J dX) exp(X); exact to rounding for turns up
+    to 4 rad."""
 
     def __init__(self, twist):
         self._twist = twist

@@ -1,7 +1,7 @@
 """Material parameters: what a silicone is, apart from how a solver uses it.
 
-Each law is an energy density W (MPa) of the isochoric deformation, with I1 and I2 the invariants of C / det(C)^(1/3) and
-l1, l2, l3 its principal stretches. Incompressible unless a bulk modulus is given.
+Each law is an energy density W (MPa) of the isochoric deformation, with I1 and I2 the invariants of C /
+det(C)^(1/3) and l1, l2, l3 its principal stretches. Incompressible unless a bulk modulus is given.
 """
 
 import math
@@ -21,8 +21,8 @@ STABLE_AT_LEAST = 1.2
 class Hyperelastic:
     """What every law has beside its own parameters; those come first, in order of the law's formula.
 
-    density in tonne/mm^3 (file key: kg/m^3); bulk_modulus in MPa, inf = incompressible; elongation_at_break: engineering
-    strain, inf = not known. Infinite values are not written to files.
+    density in tonne/mm^3 (file key: kg/m^3); bulk_modulus in MPa, inf = incompressible; elongation_at_break:
+    engineering strain, inf = not known. Infinite values are not written to files.
     """
 
     density: float = quantity("kg_per_m3", 1.07e-9, note="mass density")
@@ -35,23 +35,32 @@ class Hyperelastic:
         if not 0 <= self.density < 1e-7:
             raise InputError(f"density_kg_per_m3 = {self.density * 1e12:g} is outside 0..1e5")
         if not self.elongation_at_break > 0:
-            raise InputError(f"elongation_at_break_percent = {self.elongation_at_break * 100:g} must be larger than 0")
+            raise InputError(
+                f"elongation_at_break_percent = {self.elongation_at_break * 100:g} must be larger than 0"
+            )
         self._check_law()
         if not 1e-4 <= self.mu <= 1e3:
             raise InputError(
-                f"{self.stiffness} = {self.mu:g} is outside 1e-4..1e3 MPa: silicones lie in 0.01..2 MPa; is it in kPa?"
+                f"{self.stiffness} = {self.mu:g} is outside 1e-4..1e3 MPa: silicones lie in 0.01..2 MPa; is"
+                " it in kPa?"
                 if self.mu > 0
-                else f"{self.stiffness} = {self.mu:g} must be larger than 0: the initial shear modulus would not be positive"
+                else (
+                    f"{self.stiffness} = {self.mu:g} must be larger than 0: the initial shear modulus would"
+                    " not be positive"
+                )
             )
         if not self.bulk_modulus >= 5 * self.mu:
             raise InputError(
-                f"bulk_modulus_MPa = {self.bulk_modulus:g} is less than 5 shear moduli ({self.mu:g} MPa): not a rubber; "
-                "leave it out for an incompressible one"
+                f"bulk_modulus_MPa = {self.bulk_modulus:g} is less than 5 shear moduli ({self.mu:g} MPa): not"
+                " a rubber; leave it out for an incompressible one"
             )
         for mode in MODES:
             limit = stable_stretch(self, mode, STABLE_AT_LEAST)
             if limit < math.inf:
-                raise InputError(f"law = '{self.law}': these parameters are unstable from stretch {limit:.3g} on in {mode}: check signs")
+                raise InputError(
+                    f"law = '{self.law}': these parameters are unstable from stretch {limit:.3g} on in"
+                    f" {mode}: check signs"
+                )
 
     def __init_subclass__(cls):
         #: names of the law's own parameters, in order
@@ -120,14 +129,18 @@ class Gent(Hyperelastic):
 
     def _check_law(self):
         if not 0.1 <= self.jm <= 1e6:
-            raise InputError(f"jm = {self.jm:g} must lie in 0.1..1e6: it is the largest I1 - 3 (some 10 to 100 for silicones)")
+            raise InputError(
+                f"jm = {self.jm:g} must lie in 0.1..1e6: it is the largest I1 - 3 (some 10 to 100 for"
+                " silicones)"
+            )
 
 
 @dataclass(frozen=True)
 class Ogden(Hyperelastic):
     """W = sum over p of 2 mu_p / alpha_p^2 (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3), up to three terms.
 
-    The shear modulus is mu1 + mu2 + mu3. (With the other convention, W = sum M_p / alpha_p (...), mu_p = M_p alpha_p / 2.)
+    The shear modulus is mu1 + mu2 + mu3. (With the other convention, W = sum M_p / alpha_p (...), mu_p = M_p
+    alpha_p / 2.)
     """
 
     mu1: float = quantity("MPa")
@@ -147,7 +160,11 @@ class Ogden(Hyperelastic):
     @cached_property
     def terms(self):
         """((mu_p, alpha_p), ...) of the terms in use."""
-        return tuple((m, a) for m, a in ((self.mu1, self.alpha1), (self.mu2, self.alpha2), (self.mu3, self.alpha3)) if m)
+        return tuple(
+            (m, a)
+            for m, a in ((self.mu1, self.alpha1), (self.mu2, self.alpha2), (self.mu3, self.alpha3))
+            if m
+        )
 
     @cached_property
     def half_power_weights(self):
@@ -157,14 +174,22 @@ class Ogden(Hyperelastic):
         return weights(self.terms)
 
     def _check_law(self):
-        for p, (m, a) in enumerate(((self.mu1, self.alpha1), (self.mu2, self.alpha2), (self.mu3, self.alpha3)), start=1):
+        for p, (m, a) in enumerate(
+            ((self.mu1, self.alpha1), (self.mu2, self.alpha2), (self.mu3, self.alpha3)), start=1
+        ):
             if m and not 1e-3 <= abs(a) <= self.largest_exponent:
-                raise InputError(f"alpha{p} = {a:g} must lie in -{self.largest_exponent:g}..{self.largest_exponent:g} and not be 0")
+                raise InputError(
+                    f"alpha{p} = {a:g} must lie in -{self.largest_exponent:g}..{self.largest_exponent:g} and"
+                    " not be 0"
+                )
 
 
-#: The paper's two calibrations (physics: mu = 0.317 for its twisting theory; E = 0.619, nu = 0.49 for its helical one).
+#: The paper's two calibrations (physics: mu = 0.317 for its twisting theory; E = 0.619, nu = 0.49 for its
+#: helical one).
 PAPER_TWISTING = NeoHookean(mu=0.317, name="paper, twisting theory", source="Jiang et al. 2021, Eq. 2")
-PAPER_HELICAL = NeoHookean(mu=0.619 / (2 * 1.49), name="paper, helical theory", source="Jiang et al. 2021, Sec. IV, E=0.619, nu=0.49")
+PAPER_HELICAL = NeoHookean(
+    mu=0.619 / (2 * 1.49), name="paper, helical theory", source="Jiang et al. 2021, Sec. IV, E=0.619, nu=0.49"
+)
 
 LAWS = {cls.law: cls for cls in (NeoHookean, MooneyRivlin, Yeoh, Gent, Ogden)}
 
@@ -175,12 +200,14 @@ def silicone(name):
 
 
 def material_from_table(table, where):
-    """A law from its TOML table: `law = "..."` (default neo-Hookean) with its parameters, or `silicone = "..."`, a row of the
-    table in base.silicones, of which further keys replace values."""
+    """A law from its TOML table: `law = "..."` (default neo-Hookean) with its parameters, or `silicone =
+    "..."`, a row of the table in base.silicones, of which further keys replace values."""
     table = as_table(table, where)
     if "silicone" in table:
         if "law" in table:
-            raise InputError(f"{where}: 'silicone' and 'law' exclude each other: the table of silicones is neo-Hookean")
+            raise InputError(
+                f"{where}: 'silicone' and 'law' exclude each other: the table of silicones is neo-Hookean"
+            )
         try:
             table = {**bulletin(table.pop("silicone")), **table}
         except InputError as error:

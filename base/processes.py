@@ -1,7 +1,8 @@
-"""Child processes that a long run can rely on: free of an MPI launcher's marks, gone with their parent, within limits.
+"""Child processes that a long run can rely on: free of an MPI launcher's marks, gone with their parent,
+within limits.
 
-Run as a script this file is the doorman of a child: it sets the limits on itself and becomes the command. (Python's own way,
-a function between fork and exec, is not safe in a process with MPI's threads.)
+Run as a script this file is the doorman of a child: it sets the limits on itself and becomes the command.
+(Python's own way, a function between fork and exec, is not safe in a process with MPI's threads.)
 """
 
 import ctypes
@@ -14,7 +15,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-#: variables by which MPI launchers (Open MPI 4 and 5, MPICH, SLURM's PMI) tell a process that it is one of their ranks
+#: variables by which MPI launchers (Open MPI 4 and 5, MPICH, SLURM's PMI) tell a process that it is one of
+#: their ranks
 LAUNCHER_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_")
 POLL_SECONDS = 0.02
 MB = 1 << 20
@@ -22,7 +24,8 @@ MB = 1 << 20
 
 @dataclass(frozen=True)
 class Limits:
-    """What one child may take: wall time in s, memory (RLIMIT_DATA: heap and private maps of each process) in MB; None: all."""
+    """What one child may take: wall time in s, memory (RLIMIT_DATA: heap and private maps of each process) in
+    MB; None: all."""
 
     seconds: float | None = None
     memory_MB: float | None = None
@@ -30,7 +33,8 @@ class Limits:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a child ended: exit code (negative: the signal's number), wall seconds, peak resident memory in MB."""
+    """How a child ended: exit code (negative: the signal's number), wall seconds, peak resident memory in
+    MB."""
 
     code: int
     seconds: float
@@ -39,7 +43,8 @@ class Ended:
 
 
 def environment_without_launcher():
-    """This process's environment, in which a child that starts MPI does not take itself for a rank of our launcher."""
+    """This process's environment, in which a child that starts MPI does not take itself for a rank of our
+    launcher."""
     return {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_PREFIXES)}
 
 
@@ -52,8 +57,9 @@ def end_with_parent(number=signal.SIGTERM):
 def run_limited(command, limits, log, environment=None, directory=None):
     """Run `command` (list of str) to its end or its limits; returns Ended.
 
-    Standard output and error go to the file `log`. The child leads a process group that is killed with all its members
-    when the time is over, when we are interrupted, and when the child ends and leaves some behind. It dies with us.
+    Standard output and error go to the file `log`. The child leads a process group that is killed with all
+    its members when the time is over, when we are interrupted, and when the child ends and leaves some
+    behind. It dies with us.
     """
     doorman = [sys.executable, "-P", __file__, str(os.getpid()), str(int((limits.memory_MB or 0) * MB))]
     started = time.monotonic()
@@ -100,7 +106,8 @@ def _become(parent, memory, command):
 
 
 def machine_memory_MB():
-    """Physical memory of this machine in MB; of a container with a limit of its own, that limit (cgroup version 2)."""
+    """Physical memory of this machine in MB; of a container with a limit of its own, that limit (cgroup
+    version 2)."""
     total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     try:
         total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))

@@ -12,7 +12,8 @@ from base.files import write_text
 
 
 def revision():
-    """Git revision of the source tree, with '-dirty' when it has local changes; 'unknown' outside a checkout."""
+    """Git revision of the source tree, with '-dirty' when it has local changes; 'unknown' outside a
+    checkout."""
     root = Path(__file__).resolve().parent.parent
     try:
         out = subprocess.run(
@@ -43,7 +44,8 @@ def machine():
 
 
 def write_record(directory, name="run.json", **entries):
-    """Write run.json: command, time, revision, machine, and whatever the caller knows (inputs, versions, steps)."""
+    """Write run.json: command, time, revision, machine, and whatever the caller knows (inputs, versions,
+    steps)."""
     record = {
         "command": " ".join(Path(a).name if i == 0 else a for i, a in enumerate(sys.argv)),
         "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),

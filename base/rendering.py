@@ -1,4 +1,5 @@
-"""Pictures of bodies: VTK off-screen (no X needed), one view for all; matplotlib adds scale, axes and colour bar.
+"""Pictures of bodies: VTK off-screen (no X needed), one view for all; matplotlib adds scale, axes and colour
+bar.
 
 pyvista and matplotlib are imported inside the functions: without them everything else works.
 """
@@ -13,8 +14,8 @@ PIXELS = (900, 720)
 
 
 def camera_angles(points):
-    """(elevation, azimuth) in degrees from which a curve (n, 3) with z up is seen well: 25 degrees above, and across
-    its longest horizontal direction, turned by 30 degrees so that depth shows."""
+    """(elevation, azimuth) in degrees from which a curve (n, 3) with z up is seen well: 25 degrees above, and
+    across its longest horizontal direction, turned by 30 degrees so that depth shows."""
     flat = np.asarray(points)[:, :2] - np.mean(np.asarray(points)[:, :2], axis=0)
     _, _, directions = np.linalg.svd(flat, full_matrices=False)
     along = directions[0] * (1 if directions[0] @ (flat[-1] - flat[0]) >= 0 else -1)
@@ -35,7 +36,8 @@ def save(figure, path, dpi=120):
 
 @dataclass(frozen=True)
 class View:
-    """A parallel projection: focus (3,), unit vectors `right` and `up` (3,) of the image, half height shown in mm."""
+    """A parallel projection: focus (3,), unit vectors `right` and `up` (3,) of the image, half height shown
+    in mm."""
 
     focus: np.ndarray
     right: np.ndarray
@@ -52,7 +54,9 @@ def view_of(points, margin=1.12):
     points = np.asarray(points, float)
     elevation, azimuth = np.radians(camera_angles(points))
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
+    up = np.array(
+        [-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)]
+    )
     towards = np.cross(right, up)
     image = points @ np.column_stack([right, up, towards])
     middle = (image.min(axis=0) + image.max(axis=0)) / 2
@@ -100,8 +104,9 @@ def coloured(surface, name, limits, cmap):
 
 
 def write_picture(path, view, image, title, bar=None, extend="neither"):
-    """PNG of a rendered image with a title, a scale in mm, the directions of the axes and, when `bar` = (label,
-    limits, cmap) is given, a colour bar; extend: as matplotlib's, the ends beyond which there are values."""
+    """PNG of a rendered image with a title, a scale in mm, the directions of the axes and, when `bar` =
+    (label, limits, cmap) is given, a colour bar; extend: as matplotlib's, the ends beyond which there are
+    values."""
     height = 5.95 + (0.85 if bar else 0.0)
     fig = figure(7.0, height)
     picture = 5.6 / height
@@ -113,7 +118,9 @@ def write_picture(path, view, image, title, bar=None, extend="neither"):
 
         label, limits, cmap = bar
         cax = fig.add_axes([0.1, 0.62 / height, 0.8, 0.15 / height])
-        fig.colorbar(ScalarMappable(Normalize(*limits), cmap), cax=cax, orientation="horizontal", extend=extend)
+        fig.colorbar(
+            ScalarMappable(Normalize(*limits), cmap), cax=cax, orientation="horizontal", extend=extend
+        )
         cax.set_xlabel(label, fontsize=13)
         cax.tick_params(labelsize=12)
     save(fig, path, dpi=100)
@@ -148,6 +155,14 @@ def _triad(ax, view):
             "",
             xy=origin + step,
             xytext=origin,
-            arrowprops={"arrowstyle": "-|>", "color": "#30363d", "linewidth": 1.2, "shrinkA": 0, "shrinkB": 0},
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": "#30363d",
+                "linewidth": 1.2,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
         )
-        ax.text(*(origin + step * (1 + 16 / np.linalg.norm(step))), name, ha="center", va="center", fontsize=13)
+        ax.text(
+            *(origin + step * (1 + 16 / np.linalg.norm(step))), name, ha="center", va="center", fontsize=13
+        )

@@ -1,8 +1,8 @@
 """Rotations and rigid motions in closed form.
 
-A pose is a 4x4 homogeneous matrix, a twist a 6-vector (rotation vector, translation part); every function takes and
-returns arrays with any leading dimensions. Formulas: Murray, Li & Sastry, A Mathematical Introduction to Robotic
-Manipulation (1994), App. A; series below `SMALL` keep them exact to rounding.
+A pose is a 4x4 homogeneous matrix, a twist a 6-vector (rotation vector, translation part); every function
+takes and returns arrays with any leading dimensions. Formulas: Murray, Li & Sastry, A Mathematical
+Introduction to Robotic Manipulation (1994), App. A; series below `SMALL` keep them exact to rounding.
 """
 
 import numpy as np
@@ -48,7 +48,8 @@ def exp_rotation(vector):
 
 
 def log_rotation(rotation):
-    """Rotation vectors (..., 3) of rotation matrices (..., 3, 3), angle in [0, pi], through unit quaternions."""
+    """Rotation vectors (..., 3) of rotation matrices (..., 3, 3), angle in [0, pi], through unit
+    quaternions."""
     from scipy.spatial.transform import Rotation
 
     R = np.asarray(rotation, float)
@@ -62,7 +63,8 @@ def hat_pose(twist):
 
 
 def screw_basis(twist):
-    """(..., 4, 4, 4): the powers 0 to 3 of X = hat_pose(twist), which exp(s X) is a combination of, since X^4 = -|w|^2 X^2."""
+    """(..., 4, 4, 4): the powers 0 to 3 of X = hat_pose(twist), which exp(s X) is a combination of, since X^4
+    = -|w|^2 X^2."""
     out = np.empty(np.shape(twist)[:-1] + (4, 4, 4))
     out[..., 0, :, :], out[..., 1, :, :] = IDENTITY, hat_pose(twist)
     out[..., 2, :, :] = out[..., 1, :, :] @ out[..., 1, :, :]
@@ -71,7 +73,8 @@ def screw_basis(twist):
 
 
 def screw_coefficients(rate, s=1.0):
-    """(..., 4) coefficients of `screw_basis` in exp(s X), for |w| = rate: 1, s, s^2 (1 - cos t)/t^2, s^3 (t - sin t)/t^3, t = s rate."""
+    """(..., 4) coefficients of `screw_basis` in exp(s X), for |w| = rate: 1, s, s^2 (1 - cos t)/t^2, s^3 (t -
+    sin t)/t^3, t = s rate."""
     t = s * rate
     small = abs(t) < SMALL
     ts = np.where(small, 1.0, t)

@@ -1,10 +1,12 @@
-"""Commercial silicones, after their makers' technical bulletins (entered from memory, not compared with them since)."""
+"""Commercial silicones, after their makers' technical bulletins (entered from memory, not compared with them
+since)."""
 
 from base.errors import InputError
 
 MPA_PER_PSI = 0.006894757
 
-#: name -> (stress at 100 % elongation, psi; elongation at break, %; density, g/cm^3); Smooth-On's technical bulletins
+#: name -> (stress at 100 % elongation, psi; elongation at break, %; density, g/cm^3); Smooth-On's technical
+#: bulletins
 BULLETINS = {
     "Ecoflex 00-10": (8, 800, 1.04),
     "Ecoflex 00-20": (8, 845, 1.07),
@@ -27,8 +29,8 @@ BULLETINS = {
 def bulletin(name):
     """File keys of a neo-Hookean material for a silicone of the table; InputError for another name.
 
-    A bulletin's "100 % modulus" is the nominal stress at twice the length, for a neo-Hookean solid mu (2 - 1/2^2): the
-    shear modulus is that stress over 1.75.
+    A bulletin's "100 % modulus" is the nominal stress at twice the length, for a neo-Hookean solid mu (2 -
+    1/2^2): the shear modulus is that stress over 1.75.
     """
     if name not in tuple(BULLETINS):
         raise InputError(f"silicone = '{name}' is not in the table: known are {', '.join(BULLETINS)}")
@@ -38,5 +40,8 @@ def bulletin(name):
         "density_kg_per_m3": round(1000 * density),
         "elongation_at_break_percent": elongation,
         "name": name,
-        "source": f"technical bulletin, from memory, not compared since; mu from its 100 % modulus, {stress} psi / 1.75",
+        "source": (
+            f"technical bulletin, from memory, not compared since; mu from its 100 % modulus, {stress} psi /"
+            " 1.75"
+        ),
     }

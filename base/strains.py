@@ -9,7 +9,8 @@ from base import se3
 
 @dataclass(frozen=True)
 class RodStrains:
-    """Strains of a section frame per *undeformed* length: frame origin c and rotation Q obey c' = Q e, Q' = Q hat(k).
+    """Strains of a section frame per *undeformed* length: frame origin c and rotation Q obey c' = Q e, Q' = Q
+    hat(k).
 
     e : (..., 3) stretch and shears; e[0] is the axial stretch along the section's normal (1 at rest).
     k : (..., 3) in 1/mm; k[0] twist, k[1] and k[2] curvatures about the width (y) and height (z) directions.
@@ -29,7 +30,8 @@ class RodStrains:
 
     @classmethod
     def from_relative_pose(cls, pose, length):
-        """Uniform strains that carry a frame over an undeformed `length` (mm) by the relative `pose` (..., 4, 4)."""
+        """Uniform strains that carry a frame over an undeformed `length` (mm) by the relative `pose` (..., 4,
+        4)."""
         twist = se3.log_pose(pose) / np.asarray(length, float)[..., None]
         return cls(twist[..., 3:], twist[..., :3])
 

@@ -1,7 +1,7 @@
 """Frozen dataclasses in and out of TOML, with the unit in every key.
 
-A field declared with `quantity("mm", 10.0)` is called `width` in Python (mm, MPa, degrees) and `width_mm` in files.
-Reading refuses unknown keys and wrong units in one line that names the key and the fix.
+A field declared with `quantity("mm", 10.0)` is called `width` in Python (mm, MPa, degrees) and `width_mm` in
+files. Reading refuses unknown keys and wrong units in one line that names the key and the fix.
 """
 
 import dataclasses
@@ -52,7 +52,9 @@ def refuse_unknown(table, known, where):
     for key in as_table(table, where):
         if key in known:
             continue
-        same_quantity = [k for k in known if k.rsplit("_", 1)[0] == key.rsplit("_", 1)[0] or k.startswith(key + "_")]
+        same_quantity = [
+            k for k in known if k.rsplit("_", 1)[0] == key.rsplit("_", 1)[0] or k.startswith(key + "_")
+        ]
         near = same_quantity or difflib.get_close_matches(key, known, n=1, cutoff=0.5)
         if same_quantity:
             raise InputError(f"{where}: key '{key}' has the wrong unit: write '{near[0]}'")
@@ -77,14 +79,18 @@ def vector(value, key, where):
 
 
 def from_table(cls, table, where, **preset):
-    """An instance of dataclass `cls` from a TOML table; fields without `unit` metadata come in by `preset`."""
+    """An instance of dataclass `cls` from a TOML table; fields without `unit` metadata come in by
+    `preset`."""
     fields = {file_key(f): f for f in dataclasses.fields(cls) if "unit" in f.metadata}
     refuse_unknown(table, fields, where)
     values = dict(preset)
     for key, field in fields.items():
         if key not in table:
             if field.default is dataclasses.MISSING:
-                raise InputError(f"{where}: key '{key}' is missing" + (f" ({field.metadata['note']})" if field.metadata["note"] else ""))
+                raise InputError(
+                    f"{where}: key '{key}' is missing"
+                    + (f" ({field.metadata['note']})" if field.metadata["note"] else "")
+                )
             continue
         value = table[key]
         if field.type in (float, "float"):
@@ -134,7 +140,11 @@ def _value(value):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (list, tuple)) or hasattr(value, "tolist"):
         items = value.tolist() if hasattr(value, "tolist") else value
-        return "[" + ", ".join(_value(v) for v in items) + "]" if isinstance(items, (list, tuple)) else _value(items)
+        return (
+            "[" + ", ".join(_value(v) for v in items) + "]"
+            if isinstance(items, (list, tuple))
+            else _value(items)
+        )
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, int):
@@ -143,7 +153,8 @@ def _value(value):
 
 
 def toml_text(tables):
-    """TOML text of nested dicts: plain values first, then [tables] and [[arrays of tables]]. Tested to read back."""
+    """TOML text of nested dicts: plain values first, then [tables] and [[arrays of tables]]. Tested to read
+    back."""
     lines = []
 
     def write(table, path):

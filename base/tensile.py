@@ -1,8 +1,9 @@
 """Uniaxial tensile tests from CSV files: nominal stress against stretch, loading up to break.
 
-The header row is the first one that names a strain (or stretch) and a stress column; what stands above it is skipped.
-Units come from the header ("strain_percent", "Engineering Stress (MPa)"). Several specimens may stand beside each other, each
-stress column taking the nearest strain column on its left, or below each other, each starting again from small strain.
+The header row is the first one that names a strain (or stretch) and a stress column; what stands above it is
+skipped. Units come from the header ("strain_percent", "Engineering Stress (MPa)"). Several specimens may
+stand beside each other, each stress column taking the nearest strain column on its left, or below each other,
+each starting again from small strain.
 """
 
 import csv
@@ -20,7 +21,8 @@ LARGEST_STRAIN = 25.0
 
 @dataclass(frozen=True)
 class Specimen:
-    """stretch (n,) rising from 1, nominal stress (n,) in MPa; broke: whether the file shows the stress fall after it."""
+    """stretch (n,) rising from 1, nominal stress (n,) in MPa; broke: whether the file shows the stress fall
+    after it."""
 
     stretch: np.ndarray
     stress: np.ndarray
@@ -28,11 +30,15 @@ class Specimen:
 
 
 def read_tensile(path, stress_unit=None):
-    """List of Specimen; stress_unit ("kPa", ...) serves where the header names none. InputError for anything unclear."""
+    """List of Specimen; stress_unit ("kPa", ...) serves where the header names none. InputError for anything
+    unclear."""
     rows = _rows(path)
     top = next((i for i, row in enumerate(rows) if _columns(row)), None)
     if top is None:
-        raise InputError(f"{path}: no header with a strain (or stretch) and a stress column, as in 'strain_percent,stress_MPa'")
+        raise InputError(
+            f"{path}: no header with a strain (or stretch) and a stress column, as in"
+            " 'strain_percent,stress_MPa'"
+        )
     header, below, specimens = rows[top], rows[top + 1 :], []
     for strain_column, stress_column in _columns(header):
         name = header[strain_column]
@@ -41,7 +47,10 @@ def read_tensile(path, stress_unit=None):
         known = np.isfinite(x) & np.isfinite(y)
         strain = x[known] - (1.0 if "stretch" in name.lower() else 0.0)
         if len(strain) and strain.max() > LARGEST_STRAIN:
-            raise InputError(f"{path}: '{name}' reaches {strain.max():g}: if these are percent, name the column strain_percent")
+            raise InputError(
+                f"{path}: '{name}' reaches {strain.max():g}: if these are percent, name the column"
+                " strain_percent"
+            )
         specimens += _specimens(strain, y[known])
     if not specimens:
         raise InputError(f"{path}: fewer than 5 points of loading with strain and stress above 0")
@@ -84,7 +93,10 @@ def _stress_factor(name, unit, path):
     words = re.split(r"[\s_()\[\],]+", name.lower())
     found = [w for w in words if w in STRESS_UNITS] or ([unit.lower()] if unit else [])
     if not found or found[0] not in STRESS_UNITS:
-        raise InputError(f"{path}: '{name}' names no unit of stress: write for instance stress_MPa, or give --stress-unit MPa")
+        raise InputError(
+            f"{path}: '{name}' names no unit of stress: write for instance stress_MPa, or give"
+            " --stress-unit MPa"
+        )
     return STRESS_UNITS[found[0]]
 
 
@@ -109,11 +121,16 @@ def _specimens(strain, stress):
             starts.append(k)
             reached = 0.0
         reached = max(reached, value)
-    return [s for s in (_loading(strain[a:b], stress[a:b]) for a, b in zip(starts, [*starts[1:], len(strain)])) if s]
+    return [
+        s
+        for s in (_loading(strain[a:b], stress[a:b]) for a, b in zip(starts, [*starts[1:], len(strain)]))
+        if s
+    ]
 
 
 def _loading(strain, stress):
-    """The Specimen up to its largest stress if the stress falls to less than 0.8 of it afterwards, else to its largest strain."""
+    """The Specimen up to its largest stress if the stress falls to less than 0.8 of it afterwards, else to
+    its largest strain."""
     if len(strain) == 0:
         return None
     top = int(np.argmax(stress))

@@ -1,5 +1,5 @@
-"""Consistent units: mm, N, MPa, tonne, s. Files and the command line carry the unit in the key; inside there is
-one system, and these are the factors between the two."""
+"""Consistent units: mm, N, MPa, tonne, s. Files and the command line carry the unit in the key; inside there
+is one system, and these are the factors between the two."""
 
 MPA_PER_KPA = 1e-3
 TONNE_PER_MM3_PER_KG_PER_M3 = 1e-12

@@ -1,4 +1,5 @@
-"""Pictures of where walls touch: a translucent deformed body, its facing walls coloured by their signed distance."""
+"""Pictures of where walls touch: a translucent deformed body, its facing walls coloured by their signed
+distance."""
 
 import numpy as np
 
@@ -19,8 +20,9 @@ LABEL = "distance of facing walls (mm); below zero: overlap"
 def draw_walls(path, body, edges, walls, gap, title, touching=0.0, view=None):
     """Write the picture; pyvista meshes in mm, `walls` with point data FIELD.
 
-    The colours are centred on touching walls and reach as far as the gap at rest (mm), or as the deepest overlap. A black line
-    surrounds where the distance is below `touching` (mm). view: base.rendering.View, by default one that holds the body.
+    The colours are centred on touching walls and reach as far as the gap at rest (mm), or as the deepest
+    overlap. A black line surrounds where the distance is below `touching` (mm). view: base.rendering.View, by
+    default one that holds the body.
     """
     distances = np.asarray(walls.point_data[FIELD])
     reach = max(gap, -float(distances.min()))

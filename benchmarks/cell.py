@@ -1,4 +1,5 @@
-"""Figures of the unit cell: cost of a sweep, mesh error, stiffness against differences of forces and against refinement."""
+"""Figures of the unit cell: cost of a sweep, mesh error, stiffness against differences of forces and against
+refinement."""
 
 import tempfile
 import time
@@ -45,7 +46,9 @@ def stiffness_difference(folder, mesh_size=2.0):
         forces = []
         for sign in (1, -1):
             wanted = q + sign * step * np.eye(6)[i]
-            held, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1, dict(enumerate(wanted)), contact="none"), path)
+            held, _ = solve_cell(
+                CellCase(segment, 0.02, mesh_size, 1, dict(enumerate(wanted)), contact="none"), path
+            )
             forces.append(np.concatenate([held.force, held.moment]))
         scale = np.sqrt(np.diag(free.stiffness))
         difference = (forces[0] - forces[1]) / (2 * step) - free.stiffness[:, i]
@@ -54,7 +57,8 @@ def stiffness_difference(folder, mesh_size=2.0):
 
 
 def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
-    """Largest relative change when the cut moves (6x6 stiffness) and when the gauge does (what belongs to no section frame)."""
+    """Largest relative change when the cut moves (6x6 stiffness) and when the gauge does (what belongs to no
+    section frame)."""
     from geometry import cad
     from geometry.cell import mesh_cell
     from hifi.cell import CellProblem
@@ -82,7 +86,11 @@ def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
     moved = np.abs((cut.stiffness - here.stiffness) / np.outer(scale, scale)).max()
     frames = np.abs(walls.screw_compliance / here.screw_compliance - 1).max()
     single = np.abs((walls.stiffness - here.stiffness) / np.outer(scale, scale)).max()
-    return float(max(moved, frames)), {"cut": float(moved), "screw_compliance": float(frames), "single_entries": float(single)}
+    return float(max(moved, frames)), {
+        "cut": float(moved),
+        "screw_compliance": float(frames),
+        "single_entries": float(single),
+    }
 
 
 def unit_cell():
@@ -98,13 +106,17 @@ def unit_cell():
     strains = {}
     for key, (_, _, states) in runs.items():
         at = {round(s.pressure, 6): s for s in states}
-        strains[key] = np.array([[*at[p].strains.e, *(at[p].strains.k * case(1.0).segment.pitch)] for p in PRESSURES])
+        strains[key] = np.array(
+            [[*at[p].strains.e, *(at[p].strains.k * case(1.0).segment.pitch)] for p in PRESSURES]
+        )
     coarse, middle, fine = (strains[size, True] for size in GRADED)
     norm = np.linalg.norm(fine - np.eye(6)[0], axis=1)
     # Richardson with the ratio that the three graded meshes show, in the norm, at each pressure
     ratio = np.linalg.norm(middle - coarse, axis=1) / np.linalg.norm(fine - middle, axis=1)
     extrapolated = fine + (fine - middle) / (ratio - 1)[:, None]
-    error = {key: float((np.linalg.norm(q - extrapolated, axis=1) / norm).max()) for key, q in strains.items()}
+    error = {
+        key: float((np.linalg.norm(q - extrapolated, axis=1) / norm).max()) for key, q in strains.items()
+    }
     stiffness = [runs[size, True][2][-1].stiffness for size in GRADED[1:]]
     eigenvalues = np.linalg.eigvals(np.linalg.solve(stiffness[1], stiffness[0])).real
     figures = {
@@ -129,14 +141,20 @@ def unit_cell():
         for (size, graded), (seconds, cells, states) in runs.items()
     ]
     order = (np.log(ratio) / np.log(GRADED[0] / GRADED[1])).tolist()
-    return figures, {"mesh_study": study, "extrapolated": extrapolated.tolist(), "observed_order": order, "gauge": gauge[1]}
+    return figures, {
+        "mesh_study": study,
+        "extrapolated": extrapolated.tolist(),
+        "observed_order": order,
+        "gauge": gauge[1],
+    }
 
 
 STUDY = """\
-One-sided-w10, 60 degrees, mu = 0.2068 MPa, the section frame on the channel's axis. Graded meshes shrink to a fifth of their size at the
-body's edges, where stresses are singular. Their three sizes are in a constant ratio; the extrapolated values take the ratio of
-their differences, so that the order is observed, not assumed. Errors are norms of (e, k pitch) over that of the extrapolated strain, the
-larger of 20 and 50 kPa. Sweeps are 0 to 50 kPa with the stiffness at every level.""".splitlines()
+One-sided-w10, 60 degrees, mu = 0.2068 MPa, the section frame on the channel's axis. Graded meshes shrink
+to a fifth of their size at the body's edges, where stresses are singular. Their three sizes are in a
+constant ratio; the extrapolated values take the ratio of their differences, so that the order is
+observed, not assumed. Errors are norms of (e, k pitch) over that of the extrapolated strain, the larger
+of 20 and 50 kPa. Sweeps are 0 to 50 kPa with the stiffness at every level.""".splitlines()
 
 
 def section(details):
@@ -145,15 +163,29 @@ def section(details):
     for r in details["mesh_study"]:
         _, strains = r["strains_e_k_pitch"]
         kind = "graded" if r["graded"] else "uniform"
-        row = [f"{r['mesh_size_mm']:g} {kind}", r["cells"], *(f"{strains[i]:.4f}" for i in (0, 1, 3, 4)), f"{r['strain_error_rel']:.1e}"]
+        row = [
+            f"{r['mesh_size_mm']:g} {kind}",
+            r["cells"],
+            *(f"{strains[i]:.4f}" for i in (0, 1, 3, 4)),
+            f"{r['strain_error_rel']:.1e}",
+        ]
         rows.append([*row, f"{r['cpu_seconds']:.0f} ({r['levels']} levels)"])
     last = details["extrapolated"][1]
     rows.append(["extrapolated", "", *(f"{last[i]:.4f}" for i in (0, 1, 3, 4)), "", ""])
     orders, gauge = details["observed_order"], details["gauge"]
     lines = ["## The unit cell's mesh", "", *STUDY, ""]
     lines += table(["mesh, mm", "cells", "e1", "e2", "k1 pitch", "k2 pitch", "error", "processor s"], rows)
-    lines += ["", f"Strains at 50 kPa. Observed orders: {orders[0]:.2f} at 20 kPa, {orders[1]:.2f} at 50 kPa."]
-    lines += [f"The same tetrahedra cut elsewhere: stiffness to {gauge['cut']:.0e}. The gauge on the cavity's walls: screw compliance to "]
-    lines[-1] += f"{gauge['screw_compliance']:.0e}; single entries of the stiffness, which belong to the frame, change by "
+    lines += [
+        "",
+        f"Strains at 50 kPa. Observed orders: {orders[0]:.2f} at 20 kPa, {orders[1]:.2f} at 50 kPa.",
+    ]
+    lines += [
+        f"The same tetrahedra cut elsewhere: stiffness to {gauge['cut']:.0e}. The gauge on the cavity's"
+        " walls: screw compliance to "
+    ]
+    lines[-1] += (
+        f"{gauge['screw_compliance']:.0e}; single entries of the stiffness, which belong to the frame,"
+        " change by "
+    )
     lines[-1] += f"{gauge['single_entries']:.0%}."
     return lines

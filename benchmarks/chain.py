@@ -12,10 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def setup():
-    """Seconds that containers/setup.sh took on a fresh Debian 13 root, as it noted while the image was built."""
-    script = '. containers/tool.sh; tool="$(container_tool)"; in_image "$1" cat /opt/pneunet/.venv/setup-seconds'
+    """Seconds that containers/setup.sh took on a fresh Debian 13 root, as it noted while the image was
+    built."""
+    script = (
+        '. containers/tool.sh; tool="$(container_tool)"; in_image "$1" cat /opt/pneunet/.venv/setup-seconds'
+    )
     with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(["bash", "-c", script, "bash", folder], cwd=ROOT, capture_output=True, text=True)
+        done = subprocess.run(
+            ["bash", "-c", script, "bash", folder], cwd=ROOT, capture_output=True, text=True
+        )
     if done.returncode or not done.stdout.split():
         sys.exit(f"bench: no image to ask; run make image first ({done.stderr.strip()[-200:]})")
     return {"setup_seconds": sum(float(word) for word in done.stdout.split())}
@@ -31,7 +36,8 @@ def ranks():
 
 
 def resume():
-    """Largest displacement difference, relative to the largest displacement, of a killed and resumed run from a whole one."""
+    """Largest displacement difference, relative to the largest displacement, of a killed and resumed run from
+    a whole one."""
     import numpy as np
 
     from tests.pneunet.test_resume import SOLVE, reached, solve
@@ -71,8 +77,12 @@ def demo():
     run = json.loads((ROOT / "out" / "demo" / "solve" / "run.json").read_text())
     return {
         "demo_seconds": seconds,
-        "demo_reduced_vs_fe_rms_percent_of_length": comparison.reduced_solved.percent(comparison.reduced_solved.rms),
-        "demo_fe_vs_target_rms_percent_of_length": comparison.solved_target.percent(comparison.solved_target.rms),
+        "demo_reduced_vs_fe_rms_percent_of_length": comparison.reduced_solved.percent(
+            comparison.reduced_solved.rms
+        ),
+        "demo_fe_vs_target_rms_percent_of_length": comparison.solved_target.percent(
+            comparison.solved_target.rms
+        ),
         "demo_pressure_reached_kPa": run["pressure_reached_kPa"],
     }
 
@@ -98,7 +108,15 @@ def long_segment():
         solve = ManipulatorSolve(body, Path(folder) / "manipulator.msh")
         start, result = time.perf_counter(), solve.run(0.05)
         seconds = time.perf_counter() - start
-    figures = {"long_segment_steps": len(result.steps), "long_segment_factorisations": solve.system.factorisations}
-    details = {"dofs": solve.problem.dofs, "ranks": 1, "wall_seconds": seconds, "failed_attempts": len(result.failures)}
+    figures = {
+        "long_segment_steps": len(result.steps),
+        "long_segment_factorisations": solve.system.factorisations,
+    }
+    details = {
+        "dofs": solve.problem.dofs,
+        "ranks": 1,
+        "wall_seconds": seconds,
+        "failed_attempts": len(result.failures),
+    }
     solve.destroy()
     return figures, details

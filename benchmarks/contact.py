@@ -1,4 +1,5 @@
-"""Figures of self-contact in the unit cell twist-w15: distances, bias, sensitivity, an independent method, an exact solution, cost."""
+"""Figures of self-contact in the unit cell twist-w15: distances, bias, sensitivity, an independent method, an
+exact solution, cost."""
 
 import tempfile
 import time
@@ -11,7 +12,8 @@ SIZE, FINER = 2.0, 1.5
 TOP = 0.05
 #: pressures (MPa) at which the third medium is asked for the force between chambers
 CHECKED = (0.01, 0.03, 0.05)
-#: of the default medium's stiffness, thickness when squeezed (J0) and regularisation: what the extrapolation starts from
+#: of the default medium's stiffness, thickness when squeezed (J0) and regularisation: what the extrapolation
+#: starts from
 SOFTNESSES = (1.0, 0.5, 0.25)
 #: keys of the details that the page is made of
 ANGLES = "angle_kPa_tau_force_N_area_mm2_nearest_mm_farthest_mm"
@@ -35,7 +37,12 @@ def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, **case):
 
     path, states, touches = Path(folder) / f"{time.monotonic_ns()}.msh", [], []
     started = time.process_time()
-    solve_cell(CellCase(body, pressure, size, levels, contact=contact, **case), path, states.append, on_touch=touches.append)
+    solve_cell(
+        CellCase(body, pressure, size, levels, contact=contact, **case),
+        path,
+        states.append,
+        on_touch=touches.append,
+    )
     return states, time.process_time() - started, touches[0] if touches else None
 
 
@@ -50,7 +57,11 @@ def curvature(state):
 
 def farthest(states, gap):
     """Largest distance of walls where they push at each other, either side of zero, over the gap."""
-    return max(max(abs(s.contact.nearest), abs(s.contact.farthest)) / gap for s in states if s.contact and s.contact.area)
+    return max(
+        max(abs(s.contact.nearest), abs(s.contact.farthest)) / gap
+        for s in states
+        if s.contact and s.contact.area
+    )
 
 
 @dataclass(frozen=True)
@@ -74,9 +85,20 @@ def angles(reference):
     found = {60: reference.states}
     for angle in (45, 75):
         found[angle] = run(reference.folder, segment(angle=float(angle)), "auto")[0]
-    figures = {f"contact_distance_rel_gap_{angle}": farthest(states, reference.body.gap) for angle, states in found.items()}
+    figures = {
+        f"contact_distance_rel_gap_{angle}": farthest(states, reference.body.gap)
+        for angle, states in found.items()
+    }
     rows = [
-        [angle, s.pressure * 1e3, twist(s), s.contact.force, s.contact.area, s.contact.nearest, s.contact.farthest]
+        [
+            angle,
+            s.pressure * 1e3,
+            twist(s),
+            s.contact.force,
+            s.contact.area,
+            s.contact.nearest,
+            s.contact.farthest,
+        ]
         for angle, states in found.items()
         for s in states[1:]
     ]
@@ -84,16 +106,26 @@ def angles(reference):
 
 
 def bias(reference):
-    """Before first touch, and where nothing touches at all: what a contact model does that ought to do nothing."""
-    one_sided, folder, before = segment("one_sided_w10", mu=0.2068), reference.folder, JUST_BEFORE * reference.touch
+    """Before first touch, and where nothing touches at all: what a contact model does that ought to do
+    nothing."""
+    one_sided, folder, before = (
+        segment("one_sided_w10", mu=0.2068),
+        reference.folder,
+        JUST_BEFORE * reference.touch,
+    )
 
     def last(body, contact, pressure):
         return run(folder, body, contact, pressure, 1)[0][-1]
 
     loose = last(reference.body, "none", before)
-    relative = {c: abs(twist(last(reference.body, c, before)) / twist(loose) - 1) for c in ("auto", "third-medium")}
+    relative = {
+        c: abs(twist(last(reference.body, c, before)) / twist(loose) - 1) for c in ("auto", "third-medium")
+    }
     bent = [curvature(last(one_sided, c, TOP)) for c in ("auto", "none")]
-    figures = {"contact_bias_twist_rel": relative["auto"], "contact_bias_curvature_rel": abs(bent[0] / bent[1] - 1)}
+    figures = {
+        "contact_bias_twist_rel": relative["auto"],
+        "contact_bias_curvature_rel": abs(bent[0] / bent[1] - 1),
+    }
     return figures, {"bias_twist_rel_third_medium": relative["third-medium"]}
 
 
@@ -135,7 +167,8 @@ def limit(values):
 
 
 def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSES):
-    """[[kPa, force (N) and twist (rad/m) at each of the softnesses]] of the third medium; ConvergenceError where it finds no state."""
+    """[[kPa, force (N) and twist (rad/m) at each of the softnesses]] of the third medium; ConvergenceError
+    where it finds no state."""
     from geometry.cell import mesh_cell
     from hifi.cell import CellProblem
     from hifi.cell_run import CONTACT_PATIENCE
@@ -157,7 +190,9 @@ def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSE
         kept, row, medium = system.state.copy(), [pressure * 1e3], followed
         for softness in softnesses:
             energy.between(medium)
-            run_steps(EquilibriumPath(Softening(system, energy), LoadControl(), options), 1.0, StepSize(0.5, 1e-3))
+            run_steps(
+                EquilibriumPath(Softening(system, energy), LoadControl(), options), 1.0, StepSize(0.5, 1e-3)
+            )
             e, k = np.split(system.state[-6:], 2)
             row += [problem.measure_contact().force, k[0] / e[0] * 1e3]
             medium = followed.softer(softness, softness / 2)
@@ -189,7 +224,10 @@ def exact(reference):
     from tests.verification.pressed import pressed
 
     force, torque, _ = pressed(reference.folder)
-    return {"contact_pressed_force_rel": force.relative_error}, {"pressed_dofs": force.dofs, "pressed_torque_N_mm": torque}
+    return {"contact_pressed_force_rel": force.relative_error}, {
+        "pressed_dofs": force.dofs,
+        "pressed_torque_N_mm": torque,
+    }
 
 
 def segment_on_two_ranks(reference):
@@ -212,13 +250,19 @@ def contact(pieces=PIECES):
             run(folder, body, method, 0.001, 1, 3.0)
         states, seconds, touch = run(folder, body, "auto")
         loose, loose_seconds, _ = run(folder, body, "none")
-        figures = {"contact_tau_50kPa_rad_per_m": twist(states[-1]), "contact_cost_factor": seconds / loose_seconds}
+        figures = {
+            "contact_tau_50kPa_rad_per_m": twist(states[-1]),
+            "contact_cost_factor": seconds / loose_seconds,
+        }
         details = {
             "first_touch_kPa": touch * 1e3,
             "kPa_tau_with_and_without_force_N_overlap_without_mm": [
-                [s.pressure * 1e3, twist(s), twist(t), s.contact.force, t.wall_distance] for s, t in zip(states, loose)
+                [s.pressure * 1e3, twist(s), twist(t), s.contact.force, t.wall_distance]
+                for s, t in zip(states, loose)
             ],
-            "steps_factorisations_CPU_s": [[s[-1].steps, s[-1].factorisations, t] for s, t in ((states, seconds), (loose, loose_seconds))],
+            "steps_factorisations_CPU_s": [
+                [s[-1].steps, s[-1].factorisations, t] for s, t in ((states, seconds), (loose, loose_seconds))
+            ],
         }
         reference = Reference(folder, body, states, loose, touch)
         for piece in pieces:

@@ -11,39 +11,77 @@ def page(text, results, details):
     lines = [
         "## Measured",
         "",
-        f"Cell twist-w15, 60 degrees, mu = 0.317 MPa, h = {SIZE:g} mm, unless said; tau in rad per m of deformed length. First touch at "
-        f"{details['first_touch_kPa']:.2f} kPa.",
+        (
+            f"Cell twist-w15, 60 degrees, mu = 0.317 MPa, h = {SIZE:g} mm, unless said; tau in rad per m of"
+            f" deformed length. First touch at {details['first_touch_kPa']:.2f} kPa."
+        ),
     ]
     lines += shown(
-        "Twist without and with contact, overlap without it, force between chambers, and the third medium's in its limit:",
-        {"kPa": "g", "tau without": ".2f", "tau with": ".2f", "overlap, mm": ".2f", "force, N": ".4f", "third medium, N": ""},
+        "Twist without and with contact, overlap without it, force between chambers, and the third medium's"
+        " in its limit:",
+        {
+            "kPa": "g",
+            "tau without": ".2f",
+            "tau with": ".2f",
+            "overlap, mm": ".2f",
+            "force, N": ".4f",
+            "third medium, N": "",
+        },
         [
-            [kPa, without, with_contact, -distance, force, f"{medium[kPa]:.4f} ({force / medium[kPa] - 1:+.1%})" if kPa in medium else ""]
-            for kPa, with_contact, without, force, distance in details["kPa_tau_with_and_without_force_N_overlap_without_mm"][1:]
+            [
+                kPa,
+                without,
+                with_contact,
+                -distance,
+                force,
+                f"{medium[kPa]:.4f} ({force / medium[kPa] - 1:+.1%})" if kPa in medium else "",
+            ]
+            for kPa, with_contact, without, force, distance in details[
+                "kPa_tau_with_and_without_force_N_overlap_without_mm"
+            ][1:]
         ],
     )
     lines += shown(
         "Distance of the solids' surfaces where walls push with more than a tenth of the air's pressure:",
-        {"degrees": "g", "kPa": "g", "tau": ".2f", "force, N": ".4f", "area, mm2": ".1f", "deepest, mm": "+.4f", "farthest, mm": "+.4f"},
+        {
+            "degrees": "g",
+            "kPa": "g",
+            "tau": ".2f",
+            "force, N": ".4f",
+            "area, mm2": ".1f",
+            "deepest, mm": "+.4f",
+            "farthest, mm": "+.4f",
+        },
         details[ANGLES],
     )
     lines += shown(
         "The penalty's stiffness and onset, one at a time, at 50 kPa:",
-        {"parameter": "", "times": "g", "tau": ".3f", "force, N": ".4f", "largest distance over the gap": ".2%"},
+        {
+            "parameter": "",
+            "times": "g",
+            "tau": ".3f",
+            "force, N": ".4f",
+            "largest distance over the gap": ".2%",
+        },
         details[PARAMETERS],
     )
     lines += shown(
         f"The mesh refined to {FINER:g} mm:",
         {"kPa": "g", "tau without": ".2f", "tau with": ".2f", "what contact adds": ".3f", "force, N": ".4f"},
-        [[kPa, without, with_contact, with_contact - without, force] for kPa, with_contact, without, force in details[FINE][1:]],
+        [
+            [kPa, without, with_contact, with_contact - without, force]
+            for kPa, with_contact, without, force in details[FINE][1:]
+        ],
     )
     lines += shown(
-        "Force in the third medium: as recorded, one half and one quarter as stiff and thick, and in the limit:",
+        "Force in the third medium: as recorded, one half and one quarter as stiff and thick, and in the"
+        " limit:",
         {"kPa": "g", "recorded, N": ".5f", "half, N": ".5f", "quarter, N": ".5f", "limit, N": ".4f"},
         [[kPa, *found[::2], medium[kPa]] for kPa, *found in details["kPa_force_N_tau_of_softer_media"]],
     )
     lines += shown(
-        f"The middle pitch of {segment['chambers']} pairs of chambers on {segment['ranks']} ranks ({segment['dofs']} dofs, same mesh):",
+        f"The middle pitch of {segment['chambers']} pairs of chambers on {segment['ranks']} ranks"
+        f" ({segment['dofs']} dofs, same mesh):",
         {"kPa": "g", "tau of the segment": ".2f", "tau of the cell": ".2f", "difference": "+.2%"},
         [
             [level["pressure_kPa"], twist, cell, twist / cell - 1]
@@ -58,7 +96,13 @@ def page(text, results, details):
     )
     keys = [(f"`{key}`", value) for key, value in sorted(results.items()) if key.startswith("contact_")]
     lines += shown("The figures:", {"key": "", "value": ".3g"}, keys)
-    lines += ["", f"The recorded third medium's own bias in the twist before touch is {details['bias_twist_rel_third_medium']:.2%}."]
+    lines += [
+        "",
+        (
+            "The recorded third medium's own bias in the twist before touch is"
+            f" {details['bias_twist_rel_third_medium']:.2%}."
+        ),
+    ]
     return below_mark(text, "contact", lines)
 
 

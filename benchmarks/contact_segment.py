@@ -1,7 +1,9 @@
-"""The finite segment of the part `contact`: five pairs of chambers of twist-w15 to 50 kPa, on as many ranks as it is started on.
+"""The finite segment of the part `contact`: five pairs of chambers of twist-w15 to 50 kPa, on as many ranks
+as it is started on.
 
     pneunet run -n 2 -- python -m benchmarks.contact_segment FOLDER
-writes FOLDER/segment.json: the twist of the middle pitch and the forces between walls, at the pressures of `LEVELS`.
+writes FOLDER/segment.json: the twist of the middle pitch and the forces between walls, at the pressures of
+`LEVELS`.
 """
 
 import json
@@ -47,25 +49,38 @@ def run(folder):
 
     solve.run(LEVELS[-1], note, milestones=LEVELS[:-1], stability=False)
     kept = [r for r in rows if any(abs(r["pressure_kPa"] - 1e3 * p) < 1e-6 for p in LEVELS)]
-    facts = {"ranks": comm.size, "dofs": solve.problem.dofs, "mesh_size_mm": SIZE, "chambers": CHAMBERS, "levels": kept}
+    facts = {
+        "ranks": comm.size,
+        "dofs": solve.problem.dofs,
+        "mesh_size_mm": SIZE,
+        "chambers": CHAMBERS,
+        "levels": kept,
+    }
     solve.destroy()
     on_rank_0(comm, lambda: (folder / "segment.json").write_text(json.dumps(facts)) and None)
 
 
 def beside_cell(twists, folder):
-    """({key: value}, details) of the segment on two ranks beside the cell's `twists` {pressure in MPa: rad/m} on the same mesh size."""
+    """({key: value}, details) of the segment on two ranks beside the cell's `twists` {pressure in MPa: rad/m}
+    on the same mesh size."""
     from benchmarks.rivals import environment
     from pneunet import launch
 
-    command = launch.command_line(RANKS, ["--", sys.executable, "-m", "benchmarks.contact_segment", str(folder)])
+    command = launch.command_line(
+        RANKS, ["--", sys.executable, "-m", "benchmarks.contact_segment", str(folder)]
+    )
     variables = launch.environment() | environment.ONE_THREAD | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=ROOT, env=variables, capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"bench: contact in a segment failed: {done.stderr.strip()[-500:]}")
     facts = json.loads((Path(folder) / "segment.json").read_text())
     for level in facts["levels"]:
-        level["cell_twist_rad_per_m"] = min(twists.items(), key=lambda item: abs(item[0] * 1e3 - level["pressure_kPa"]))[1]
-    worst = max(abs(level["twist_rad_per_m"] / level["cell_twist_rad_per_m"] - 1) for level in facts["levels"])
+        level["cell_twist_rad_per_m"] = min(
+            twists.items(), key=lambda item: abs(item[0] * 1e3 - level["pressure_kPa"])
+        )[1]
+    worst = max(
+        abs(level["twist_rad_per_m"] / level["cell_twist_rad_per_m"] - 1) for level in facts["levels"]
+    )
     return {"contact_segment_vs_cell_rel": worst}, facts
 
 

@@ -1,5 +1,5 @@
-"""Figures of the trained law that comes along: its errors on designs that it has not seen, as `pneunet train` found them, those on the
-held-out designs computed again from data set and law; and what it costs.
+"""Figures of the trained law that comes along: its errors on designs that it has not seen, as `pneunet train`
+found them, those on the held-out designs computed again from data set and law; and what it costs.
 """
 
 import numpy as np
@@ -10,7 +10,8 @@ from benchmarks.tables import below_mark, table
 
 PRESSURE = 0.02  # MPa
 BATCH = 10_000
-#: more slanted designs, which the law has not learned from: examples/campaigns/cells-slanted-v1.toml; bands of angles, degrees
+#: more slanted designs, which the law has not learned from: examples/campaigns/cells-slanted-v1.toml; bands
+#: of angles, degrees
 SLANTED, BANDS = "cells-slanted-v1.npz", ((35, 40), (30, 35))
 #: of the free states; and of all that is judged
 FREE = ("law_strain_median_rel", "law_strain_p95_rel", "law_tip100_p95_rel", "law_stiffness_p95_rel")
@@ -26,22 +27,36 @@ def law():
 
     data, shipped = read_dataset(DATA_SET), read_law(SHIPPED)
     if shipped.about["data_sha256"] != digest(DATA_SET):
-        raise InputError(f"{SHIPPED.name} was trained on another data set than {DATA_SET.name}: make it again with pneunet train")
+        raise InputError(
+            f"{SHIPPED.name} was trained on another data set than {DATA_SET.name}: make it again with pneunet"
+            " train"
+        )
     samples, judged = samples_of(data), shipped.about["figures"]
     for kind, found in held_out_figures(shipped.kinds, samples).items():
         told = shipped.about["held_out"][kind]
         if not all(np.isclose(found[key], told[key], rtol=1e-3, equal_nan=True) for key in told):
-            raise InputError(f"{SHIPPED.name}: on held-out {kind} designs it does not do what it says: make it again with pneunet train")
+            raise InputError(
+                f"{SHIPPED.name}: on held-out {kind} designs it does not do what it says: make it again with"
+                " pneunet train"
+            )
     details = {
-        kind: {"judged on": judged_on(*pair), "figures": judged[kind], "held out": shipped.about["held_out"][kind]}
-        | shipped.about["compared"][kind]
+        kind: (
+            {
+                "judged on": judged_on(*pair),
+                "figures": judged[kind],
+                "held out": shipped.about["held_out"][kind],
+            }
+            | shipped.about["compared"][kind]
+        )
         for kind, pair in samples.items()
     }
     # the worse kind's; an interval is as bad as it is off
     figures = {key: max(one[key] for one in judged.values()) for key in JUDGED}
     inside = [one["law_interval_coverage_90"] for one in judged.values()]
     figures["law_interval_coverage_90"] = max(inside, key=lambda share: abs(share - 0.9))
-    for kind, number in zip(data.about["kinds"], np.bincount(data.kind[_coarse(data)], minlength=len(data.about["kinds"]))):
+    for kind, number in zip(
+        data.about["kinds"], np.bincount(data.kind[_coarse(data)], minlength=len(data.about["kinds"]))
+    ):
         figures[f"dataset_{kind.replace('-', '_')}"] = int(number)
     figures["dataset_accepted_fraction"] = float(data.accepted.mean())
     beyond = slanted(shipped, read_dataset(DATA_SET.with_name(SLANTED)))
@@ -53,7 +68,8 @@ def law():
 
 
 def slanted(shipped, data):
-    """{kind: [(angles, number of designs, *figures FREE)]} of a RodLaw on a data set's designs in BANDS of angles."""
+    """{kind: [(angles, number of designs, *figures FREE)]} of a RodLaw on a data set's designs in BANDS of
+    angles."""
     from reduced.judging import figures, misses
     from reduced.states import sample_of
 
@@ -96,18 +112,28 @@ def costs(shipped):
     body = Manipulator((known * 4)[:4])
     spacing = body.length / 195
     return {
-        "law_batch_10k_seconds": max(best_seconds(lambda b=b: b[0].free_strains_and_slopes(*b[1:]), 1) for b in batches),
-        "law_single_us": 1e6 * max(best_seconds(lambda s=s: shipped.strains(s, PRESSURE), 100) for s in known),
+        "law_batch_10k_seconds": max(
+            best_seconds(lambda b=b: b[0].free_strains_and_slopes(*b[1:]), 1) for b in batches
+        ),
+        "law_single_us": (
+            1e6 * max(best_seconds(lambda s=s: shipped.strains(s, PRESSURE), 100) for s in known)
+        ),
         "law_load_ms": 1e3 * best_seconds(lambda: read_law(SHIPPED), 1),
-        "rod_free_shape_with_law_us": 1e6 * best_seconds(lambda: predict(body, PRESSURE, shipped, spacing), 50),
-        "law_stiffness_10k_seconds": max(best_seconds(lambda b=b: b[0].free_stiffness(*b[1:]), 1) for b in batches),
-        "law_error_bars_10k_seconds": max(best_seconds(lambda b=b: b[0].half_width(*b[1:]), 1) for b in batches),
+        "rod_free_shape_with_law_us": (
+            1e6 * best_seconds(lambda: predict(body, PRESSURE, shipped, spacing), 50)
+        ),
+        "law_stiffness_10k_seconds": max(
+            best_seconds(lambda b=b: b[0].free_stiffness(*b[1:]), 1) for b in batches
+        ),
+        "law_error_bars_10k_seconds": max(
+            best_seconds(lambda b=b: b[0].half_width(*b[1:]), 1) for b in batches
+        ),
     }
 
 
 def page(text, details, meta):
-    """docs/rod-law.md, of which `text` is the present one, with the part below its mark made anew; meta: of the other parts, of which
-    `silicones` and `remeshed` have something to say here."""
+    """docs/rod-law.md, of which `text` is the present one, with the part below its mark made anew; meta: of
+    the other parts, of which `silicones` and `remeshed` have something to say here."""
     lines = []
     for name, part in (("silicones", silicones), ("remeshed", remeshed)):
         lines += part.lines(meta[name]["details"]) if name in meta else []
@@ -115,13 +141,31 @@ def page(text, details, meta):
     for kind, found in details.items():
         lines += ["", f"### {kind}", "", found["judged on"], ""]
         alone = {name: f"{value:.4g}" for name, value in found["held out"].items()}
-        rows = [(f"`{name}`", f"{value:.4g}", alone.get(name, "")) for name, value in found["figures"].items()]
+        rows = [
+            (f"`{name}`", f"{value:.4g}", alone.get(name, "")) for name, value in found["figures"].items()
+        ]
         lines += table(["figure", "value", "held-out designs alone"], rows)
-        rows = [(name, f"{median:.2%}", f"{high:.2%}", f"{without:.1%}") for name, median, high, without in found["laws"]]
-        lines += ["", *table(["law of the free strains", "median error", "95th percentile", "without an answer"], rows)]
+        rows = [
+            (name, f"{median:.2%}", f"{high:.2%}", f"{without:.1%}")
+            for name, median, high, without in found["laws"]
+        ]
+        lines += [
+            "",
+            *table(["law of the free strains", "median error", "95th percentile", "without an answer"], rows),
+        ]
         rows = [(n, f"{median:.2%}", f"{high:.2%}") for n, median, high in found["learning curve"]]
         lines += ["", *table(["designs trained on", "median error", "95th percentile"], rows)]
-        rows = [(angles, n, *[f"{value:.1%}" for value in values]) for angles, n, *values in found["beyond the angles"]]
-        head = ["angles that it has not learned from", "designs", "median error", "95th percentile", "of tips", "of stiffness"]
+        rows = [
+            (angles, n, *[f"{value:.1%}" for value in values])
+            for angles, n, *values in found["beyond the angles"]
+        ]
+        head = [
+            "angles that it has not learned from",
+            "designs",
+            "median error",
+            "95th percentile",
+            "of tips",
+            "of stiffness",
+        ]
         lines += ["", *table(head, rows)]
     return below_mark(text, "law", lines)

@@ -1,6 +1,8 @@
-"""The paper's twisting and helical models beside unit cells: distances as they are and calibrated, and what they predict.
+"""The paper's twisting and helical models beside unit cells: distances as they are and calibrated, and what
+they predict.
 
-`fe` solves the cells; `twisting` and `one_sided` compare and fit; the page is written by benchmarks/paper_page.py.
+`fe` solves the cells; `twisting` and `one_sided` compare and fit; the page is written by
+benchmarks/paper_page.py.
 """
 
 import tempfile
@@ -17,7 +19,8 @@ TWISTING = {"twist_w10": 0.2068, "twist_w12": 0.317, "twist_w15": 0.317}
 ONE_SIDED, ONE_SIDED_MU = "one_sided_w10", 0.2068
 #: where the twist is checked on a finer mesh
 CHECKED, CHECKED_ANGLES = "twist_w12", (30.0, 53.0)
-#: tubes that are given the paper's largest twist: fibre moduli over mu, Ri/Ro, and the paper's numbers (rad/mm, Sec. III and IV)
+#: tubes that are given the paper's largest twist: fibre moduli over mu, Ri/Ro, and the paper's numbers
+#: (rad/mm, Sec. III and IV)
 TUBES = ((1.0, 0.3), (1.0, 0.5), (3.0, 0.3), (3.0, 0.5), (10.0, 0.3), (10.0, 0.5))
 PAPER_TAU, PAPER_ANGLE, PAPER_TAU_10KPA = 0.033, 53.0, 0.0063
 
@@ -30,7 +33,8 @@ def segment(case, angle, mu):
 
 
 def sweep(body, contact, size=SIZE):
-    """((pressures, 6) of e and k, nan where the path ended short; whether walls overlap; why it ended or None)."""
+    """((pressures, 6) of e and k, nan where the path ended short; whether walls overlap; why it ended or
+    None)."""
     from base.errors import ConvergenceError, InputError
     from hifi.cell_run import solve_cell
     from hifi.cellfile import CellCase
@@ -48,7 +52,8 @@ def sweep(body, contact, size=SIZE):
 
 
 def fe(case, mu, angles):
-    """{"none" and "auto": strains (angles, pressures, 6), "touch": angles at which walls meet, "failures": [text]}.
+    """{"none" and "auto": strains (angles, pressures, 6), "touch": angles at which walls meet, "failures":
+    [text]}.
 
     Where no walls meet there is nothing for contact to do, and the cell is solved once.
     """
@@ -62,7 +67,9 @@ def fe(case, mu, angles):
             touch.append(angle)
             strains, _, reasons["auto"] = sweep(body, "auto")
         held.append(strains)
-        failures += [f"{case}, {angle:g} deg, contact {name}: {text}" for name, text in reasons.items() if text]
+        failures += [
+            f"{case}, {angle:g} deg, contact {name}: {text}" for name, text in reasons.items() if text
+        ]
     return {"none": np.array(free), "auto": np.array(held), "touch": touch, "failures": failures}
 
 
@@ -90,10 +97,14 @@ def twisting(cells, angles):
     for case, strains in cells.items():
         wanted = curves(strains, angles)
         known = np.isfinite(wanted.tau).all(axis=1)
-        kept = replace(wanted, angles=wanted.angles[known], tau=wanted.tau[known], stretch=wanted.stretch[known])
+        kept = replace(
+            wanted, angles=wanted.angles[known], tau=wanted.tau[known], stretch=wanted.stretch[known]
+        )
         tube = segment_tube(segment(case, 60.0, TWISTING[case]))
         printed = replace(tube, fibre_modulus=PAPER_FIBRE_MODULUS)
-        rows = [("as it is", replace(tube, fibre_convention=convention), None) for convention in ("axial", "hoop")]
+        rows = [
+            ("as it is", replace(tube, fibre_convention=convention), None) for convention in ("axial", "hoop")
+        ]
         rows.append(("printed E_t", printed, None))
         for radii, name in ((False, "E_t"), (True, "E_t, Ri, Ro")):
             for convention in ("axial", "hoop"):
@@ -117,11 +128,15 @@ def twisting(cells, angles):
 
 def best(rows):
     """The fit of all three constants whose squared errors are least."""
-    return min((row for row in rows if row["fitted"] == "E_t, Ri, Ro"), key=lambda row: np.square(row["errors"]).sum())
+    return min(
+        (row for row in rows if row["fitted"] == "E_t, Ri, Ro"),
+        key=lambda row: np.square(row["errors"]).sum(),
+    )
 
 
 def one_sided(strains, angles):
-    """The one-sided model as it is and softened by one and by two constants, from strains (angles, pressures, 6)."""
+    """The one-sided model as it is and softened by one and by two constants, from strains (angles, pressures,
+    6)."""
     from reduced.calibration import calibrate_softness, softened_curvature
     from reduced.helical import HelicalCell
 
@@ -131,15 +146,25 @@ def one_sided(strains, angles):
     kept = [body for body, use in zip(bodies, known) if use]
     rows = []
     for name, slanted in (("nothing", None), ("softness", False), ("softness, slant", True)):
-        constants = (1.0, 0.0) if slanted is None else calibrate_softness(kept, PRESSURES, wanted[known], slanted)
+        constants = (
+            (1.0, 0.0) if slanted is None else calibrate_softness(kept, PRESSURES, wanted[known], slanted)
+        )
         curvature = np.array([softened_curvature(body, PRESSURES, *constants) for body in bodies])
-        rows.append({"fitted": name, "constants": constants, "distance": distance(curvature, wanted), "curvature": curvature})
+        rows.append(
+            {
+                "fitted": name,
+                "constants": constants,
+                "distance": distance(curvature, wanted),
+                "curvature": curvature,
+            }
+        )
     model = [np.concatenate(HelicalCell(body).strains(PRESSURES), axis=1) for body in bodies]
     return {"rows": rows, "model": np.array(model)}
 
 
 def paper_tubes():
-    """Tubes made as large as it takes to twist by the paper's 0.033 rad/mm at 50 kPa: a row each of `TUBES`, fibres `axial`."""
+    """Tubes made as large as it takes to twist by the paper's 0.033 rad/mm at 50 kPa: a row each of `TUBES`,
+    fibres `axial`."""
     from reduced.calibration import tube_curves
     from reduced.twisting import PAPER_MU, TwistingTube
 
@@ -150,17 +175,27 @@ def paper_tubes():
         at = tau[:, -1].argmax()
         size = tau[at, -1] / PAPER_TAU
         row = {"modulus": modulus, "ratio": ratio, "outer_radius": size, "angle": angles[at]}
-        rows.append(row | {"largest": tau.max(axis=0) / size, "at_angle": tau[at] / size, "stretch": found.stretch[at, -1]})
+        rows.append(
+            row
+            | {
+                "largest": tau.max(axis=0) / size,
+                "at_angle": tau[at] / size,
+                "stretch": found.stretch[at, -1],
+            }
+        )
     return rows
 
 
 def printed():
-    """What reduced.printed finds: the largest twist with the printed constants, and the printed equations' least residuals."""
+    """What reduced.printed finds: the largest twist with the printed constants, and the printed equations'
+    least residuals."""
     from reduced.printed import MULTIPLIERS, largest_twist, printed_equations
     from reduced.twisting import PAPER_FIBRE_MODULUS, PAPER_MU, TwistingTube
 
     tube = TwistingTube(3.0, 7.0, PAPER_MU, PAPER_FIBRE_MODULUS)
-    residuals = {m: float(np.linalg.norm(printed_equations(tube, 60.0, 0.02, m).residual)) for m in MULTIPLIERS}
+    residuals = {
+        m: float(np.linalg.norm(printed_equations(tube, 60.0, 0.02, m).residual)) for m in MULTIPLIERS
+    }
     return {"largest_twist": largest_twist(tube, range(30, 90, 10), 2e-3), "residuals": residuals}
 
 
@@ -169,12 +204,22 @@ def compare(cells):
     tubes = twisting({case: cells[case]["auto"] for case in TWISTING}, ANGLES)
     bending = one_sided(cells[ONE_SIDED]["auto"], (*ANGLES, 90.0))
     figures = {
-        "analytic_vs_fe_twist_rel": float(np.median(np.concatenate([rows[0]["distance"] for rows in tubes.values()]))),
-        "analytic_vs_fe_twist_rel_calibrated": float(np.median(np.concatenate([best(rows)["distance"] for rows in tubes.values()]))),
+        "analytic_vs_fe_twist_rel": float(
+            np.median(np.concatenate([rows[0]["distance"] for rows in tubes.values()]))
+        ),
+        "analytic_vs_fe_twist_rel_calibrated": float(
+            np.median(np.concatenate([best(rows)["distance"] for rows in tubes.values()]))
+        ),
         "analytic_vs_fe_curvature_rel": float(np.median(bending["rows"][0]["distance"])),
         "analytic_vs_fe_curvature_rel_calibrated": float(np.median(bending["rows"][-1]["distance"])),
     }
-    details = {"cells": cells, "tubes": tubes, "bending": bending, "paper_tubes": paper_tubes(), "printed": printed()}
+    details = {
+        "cells": cells,
+        "tubes": tubes,
+        "bending": bending,
+        "paper_tubes": paper_tubes(),
+        "printed": printed(),
+    }
     return figures, plain(details)
 
 

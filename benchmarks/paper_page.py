@@ -26,56 +26,65 @@ SHOWN = "twist_w15"
 KPA = [round(p * 1e3) for p in PRESSURES]
 
 ABOUT = """\
-Jiang et al., Appl. Phys. Rev. 8, 041416 (2021), "the paper", has a theory of the twisting segment (a tube with fibres, Eqs 1-21)
-and one of the helical segment (in its supplement, which is lost). Here both, in the forms of [theory-reduced.md](theory-reduced.md),
-stand beside the finite elements: as they are, with nothing fitted, and with their constants fitted to the very cells
-they are compared with, which is the best that they can do. tau is per deformed length."""
+Jiang et al., Appl. Phys. Rev. 8, 041416 (2021), "the paper", has a theory of the twisting segment (a tube
+with fibres, Eqs 1-21) and one of the helical segment (in its supplement, which is lost). Here both, in
+the forms of [theory-reduced.md](theory-reduced.md), stand beside the finite elements: as they are, with
+nothing fitted, and with their constants fitted to the very cells they are compared with, which is the
+best that they can do. tau is per deformed length."""
 CELLS = """\
-Unit cells (one pitch of a long segment, screw-periodic, P2/P1, h = {size:g} mm) of the cases {cases} at mu = 0.317 MPa (w10:
-0.2068) and of one-sided-w10 at 0.2068, angles {angles} degrees (one-sided: 90 too), 10 to 50 kPa. Cells were solved without contact
-and, where walls meet by 50 kPa, again with it ([contact.md](contact.md)); "with contact" is what all comparisons are with. Walls
-meet: {touch}. {failures} The paper's own geometry is not among them: dimensions of its twisting segment stood in the supplement. Of
-ours twist-w15 has the paper's c1 = 0.27 if the isotropic part is the core (its 15 x 4 mm of the mean outline's area are 0.26; w12
-0.38, w10 0.38). Mesh: {checked} without contact at h = {finer:g} mm twists at 50 kPa by {ratios} times as much at {checked_angles}
-degrees. Cells at less than 30 degrees are not meshed."""
+Unit cells (one pitch of a long segment, screw-periodic, P2/P1, h = {size:g} mm) of the cases {cases} at
+mu = 0.317 MPa (w10: 0.2068) and of one-sided-w10 at 0.2068, angles {angles} degrees (one-sided: 90 too),
+10 to 50 kPa. Cells were solved without contact and, where walls meet by 50 kPa, again with it
+([contact.md](contact.md)); "with contact" is what all comparisons are with. Walls meet: {touch}.
+{failures} The paper's own geometry is not among them: dimensions of its twisting segment stood in the
+supplement. Of ours twist-w15 has the paper's c1 = 0.27 if the isotropic part is the core (its 15 x 4 mm
+of the mean outline's area are 0.26; w12 0.38, w10 0.38). Mesh: {checked} without contact at h = {finer:g}
+mm twists at 50 kPa by {ratios} times as much at {checked_angles} degrees. Cells at less than 30 degrees
+are not meshed."""
 TWIST = """\
 tau of {case} in rad/m, with contact (without):"""
 HIGHEST = """\
-Angle of the largest tau, from a cubic through the computed angles; "30" means that tau still grows at the smallest angle that was
-computed. The paper: {paper_angle:g} degrees at 50 kPa, with {paper_tau:g} rad/mm."""
+Angle of the largest tau, from a cubic through the computed angles; "30" means that tau still grows at the
+smallest angle that was computed. The paper: {paper_angle:g} degrees at 50 kPa, with {paper_tau:g} rad/mm."""
 TUBE = """\
-*as it is*: E_t = 3 mu, Ri and Ro from equal areas. Fits minimise the sum of the squared errors of tau and of stretch - 1 over all
-angles and pressures, each error a root mean square over that of the cells (0 = perfect, 1 = no better than a tube that does not
-move); tau's distance is |tau/tau_FE - 1|, states that a tube does not have below its limit load count as 1."""
+*as it is*: E_t = 3 mu, Ri and Ro from equal areas. Fits minimise the sum of the squared errors of tau and
+of stretch - 1 over all angles and pressures, each error a root mean square over that of the cells (0 =
+perfect, 1 = no better than a tube that does not move); tau's distance is |tau/tau_FE - 1|, states that a
+tube does not have below its limit load count as 1."""
 CONVENTION = """\
-The convention: A on (Z, Psi) is (cos, sin) in `axial`, as below Eq. 3 and as a chamber runs, (sin, cos) in `hoop`, as in Eqs 11-13.
-In the tube one is the other at the complementary angle, so wherever the axial tube twists most, the hoop tube does at 90 degrees
-less that."""
+The convention: A on (Z, Psi) is (cos, sin) in `axial`, as below Eq. 3 and as a chamber runs, (sin, cos)
+in `hoop`, as in Eqs 11-13. In the tube one is the other at the complementary angle, so wherever the axial
+tube twists most, the hoop tube does at 90 degrees less that."""
 SLOPE = """\
-The tube's tau(P) is convex wherever it follows: tau at 50 kPa over five times tau at 10 kPa (1 = a straight line) at 60 degrees is"""
+The tube's tau(P) is convex wherever it follows: tau at 50 kPa over five times tau at 10 kPa (1 = a
+straight line) at 60 degrees is"""
 ANCHORS = """\
-The paper's numbers: tau is at most {paper_tau:g} rad/mm (also printed as 0.0325) at 50 kPa, at {paper_angle:g} degrees, and
-{paper_10:g} at 10 kPa; "the slope of tau decreases with P". These do not go together: with a falling slope tau at {paper_angle:g}
-degrees and 50 kPa is less than five times that at 10 kPa, 0.0315 at most. Tubes (axial, mu = 0.317 MPa) made as large as it takes
-to reach {paper_tau:g}:"""
+The paper's numbers: tau is at most {paper_tau:g} rad/mm (also printed as 0.0325) at 50 kPa, at
+{paper_angle:g} degrees, and {paper_10:g} at 10 kPa; "the slope of tau decreases with P". These do not go
+together: with a falling slope tau at {paper_angle:g} degrees and 50 kPa is less than five times that at
+10 kPa, 0.0315 at most. Tubes (axial, mu = 0.317 MPa) made as large as it takes to reach {paper_tau:g}:"""
 PRINTED = """\
-The printed constants and equations (`python -m reduced.printed`; Ri = 3, Ro = 7 mm): with E_t = 0.008 MPa the consistent tube
-twists by at most {largest:.2g} rad/mm at any angle and pressure below its limit load, a {share:.0f}th of the paper's figure. With
-the radii of our cases it is a median {printed} off, beyond its limit load in {lost:.0f} % of the states. The
-printed equations have no solution (relative residual at least {unknown:.2g}, or {pressure:.2g} if their P is taken for the pressure)."""
+The printed constants and equations (`python -m reduced.printed`; Ri = 3, Ro = 7 mm): with E_t = 0.008 MPa
+the consistent tube twists by at most {largest:.2g} rad/mm at any angle and pressure below its limit load,
+a {share:.0f}th of the paper's figure. With the radii of our cases it is a median {printed} off, beyond
+its limit load in {lost:.0f} % of the states. The printed equations have no solution (relative residual at
+least {unknown:.2g}, or {pressure:.2g} if their P is taken for the pressure)."""
 HELIX = """\
-Chambers that open across themselves alone bend an oblique strip: k1/k2 = cot(theta), hence P_t kappa_h = 2 pi cot(theta) (the
-paper's kappa_h is 1 over the radius of the helix's cylinder, P_t its pitch). The paper's octopus target obeys it: 70 1/m times 90
-mm = 6.30 is 2 pi cot(44.9). P_t kappa_h / (2 pi cot(theta)) of one-sided-w10 on the channel's axis, in brackets of the line along
-the bottom:"""
+Chambers that open across themselves alone bend an oblique strip: k1/k2 = cot(theta), hence P_t kappa_h =
+2 pi cot(theta) (the paper's kappa_h is 1 over the radius of the helix's cylinder, P_t its pitch). The
+paper's octopus target obeys it: 70 1/m times 90 mm = 6.30 is 2 pi cot(44.9). P_t kappa_h / (2 pi
+cot(theta)) of one-sided-w10 on the channel's axis, in brackets of the line along the bottom:"""
 SOFTNESS = """\
-|k| of a screw does not depend on its line. Fitted: a factor on the pressure (the same as one on 1/mu), and a power of 1/sin(theta)
+|k| of a screw does not depend on its line. Fitted: a factor on the pressure (the same as one on 1/mu),
+and a power of 1/sin(theta)
 to it:"""
 
 
 def _prose(text, **facts):
     """Lines of a paragraph."""
-    return textwrap.wrap(" ".join(text.format(**facts).split() if facts else text.split()), WIDTH, break_on_hyphens=False)
+    return textwrap.wrap(
+        " ".join(text.format(**facts).split() if facts else text.split()), WIDTH, break_on_hyphens=False
+    )
 
 
 def _case(name):
@@ -119,7 +128,8 @@ def _number(value, form="{:.1f}"):
 
 
 def _helix(strains, height):
-    """P_t kappa_h / (2 pi cot(theta)) on the line at z = height (mm), of strains (angles, pressures, 6); 90 degrees left out."""
+    """P_t kappa_h / (2 pi cot(theta)) on the line at z = height (mm), of strains (angles, pressures, 6); 90
+    degrees left out."""
     from base.strains import RodStrains
 
     strains = strains[:-1]
@@ -130,7 +140,8 @@ def _helix(strains, height):
 
 def _cells_section(d):
     touch = "; ".join(
-        f"{_case(name)} at {_listed(cells['touch']) if cells['touch'] else 'no angle'}" for name, cells in d["cells"].items()
+        f"{_case(name)} at {_listed(cells['touch']) if cells['touch'] else 'no angle'}"
+        for name, cells in d["cells"].items()
     )
     failures = [text for cells in d["cells"].values() for text in cells["failures"]]
     coarse = _tau(d["cells"][CHECKED]["none"])[[ANGLES.index(a) for a in CHECKED_ANGLES], -1]
@@ -141,7 +152,11 @@ def _cells_section(d):
         cases=", ".join(map(_case, TWISTING)),
         angles=_listed(ANGLES),
         touch=touch,
-        failures=("Paths that ended short: " + "; ".join(failures) + ".") if failures else "Every path reached 50 kPa.",
+        failures=(
+            ("Paths that ended short: " + "; ".join(failures) + ".")
+            if failures
+            else "Every path reached 50 kPa."
+        ),
         checked=_case(CHECKED),
         ratios=" and ".join(f"{r:.3f}" for r in ratios),
         checked_angles=" and ".join(f"{a:g}" for a in CHECKED_ANGLES),
@@ -165,7 +180,10 @@ def _twist_section(d):
         if d["cells"][name]["touch"]:
             kinds.append(("FE, without", _tau(d["cells"][name]["none"])))
         fitted = [row for row in d["tubes"][name] if row["fitted"] in ("as it is", "E_t, Ri, Ro")]
-        kinds += [(f"tube, {row['tube']['fibre_convention']}, {_fit_name(row)}", 1e3 * _array(row["tau"])) for row in fitted]
+        kinds += [
+            (f"tube, {row['tube']['fibre_convention']}, {_fit_name(row)}", 1e3 * _array(row["tau"]))
+            for row in fitted
+        ]
         rows += [[_case(name), kind, *(_highest_text(tau[:, j]) for j in (0, 2, 4))] for kind, tau in kinds]
     return lines + table(["case", "", *(f"{KPA[j]} kPa: deg (rad/m)" for j in (0, 2, 4))], rows)
 
@@ -181,19 +199,42 @@ def _tube_section(d):
         for row in d["tubes"][name]:
             tube, distance = row["tube"], row["distance"]
             errors = ["", ""] if row["errors"] is None else [f"{e:.2f}" for e in row["errors"]]
-            constants = [f"{tube['fibre_modulus'] / tube['mu']:.2g}", f"{tube['inner_radius']:.2f}", f"{tube['outer_radius']:.2f}"]
+            constants = [
+                f"{tube['fibre_modulus'] / tube['mu']:.2g}",
+                f"{tube['inner_radius']:.2f}",
+                f"{tube['outer_radius']:.2f}",
+            ]
             share = f"{100 * np.median(distance):.0f} %; {100 * np.max(distance):.0f} %"
             rows.append([_case(name), tube["fibre_convention"], row["fitted"], *constants, *errors, share])
-    head = ["case", "convention", "fitted", "E_t/mu", "Ri, mm", "Ro, mm", "error of tau", "of stretch", "tau's distance: median; worst"]
+    head = [
+        "case",
+        "convention",
+        "fitted",
+        "E_t/mu",
+        "Ri, mm",
+        "Ro, mm",
+        "error of tau",
+        "of stretch",
+        "tau's distance: median; worst",
+    ]
     lines += table(head, rows)
     lines += ["", *_prose(CONVENTION + " " + _verdict(d)), ""]
     at = ANGLES.index(60.0)
     ratio = {
-        name: (_tau(d["cells"][name]["auto"])[at, -1] / _tau(d["cells"][name]["auto"])[at, 0] / 5, best(d["tubes"][name])["tau"][at])
+        name: (
+            _tau(d["cells"][name]["auto"])[at, -1] / _tau(d["cells"][name]["auto"])[at, 0] / 5,
+            best(d["tubes"][name])["tau"][at],
+        )
         for name in TWISTING
     }
-    text = ", ".join(f"{tau[-1] / tau[0] / 5:.2f} against {fe:.2f} in the cells ({_case(n)})" for n, (fe, tau) in ratio.items() if tau[-1])
-    return lines + _prose(f"{SLOPE} {text}. No fit changes that, and it is most of what is left of the error.")
+    text = ", ".join(
+        f"{tau[-1] / tau[0] / 5:.2f} against {fe:.2f} in the cells ({_case(n)})"
+        for n, (fe, tau) in ratio.items()
+        if tau[-1]
+    )
+    return lines + _prose(
+        f"{SLOPE} {text}. No fit changes that, and it is most of what is left of the error."
+    )
 
 
 def _verdict(d):
@@ -205,7 +246,9 @@ def _verdict(d):
                 squares[name, row["fitted"], row["tube"]["fibre_convention"]] = np.square(row["errors"]).sum()
     texts = []
     for fitted in ("E_t", "E_t, Ri, Ro"):
-        ratios = ", ".join(f"{squares[name, fitted, 'hoop'] / squares[name, fitted, 'axial']:.2f}" for name in TWISTING)
+        ratios = ", ".join(
+            f"{squares[name, fitted, 'hoop'] / squares[name, fitted, 'axial']:.2f}" for name in TWISTING
+        )
         texts.append(f"{ratios} with {fitted} fitted")
     moduli, hoop = [], []
     for rows in d["tubes"].values():
@@ -215,10 +258,12 @@ def _verdict(d):
                 moduli += [tube["fibre_modulus"] / tube["mu"]] if tube["fibre_convention"] == "axial" else []
                 hoop += [tube["outer_radius"]] if tube["fibre_convention"] == "hoop" else []
     return (
-        f"Sum of squared errors, hoop over axial ({', '.join(map(_case, TWISTING))}): {'; '.join(texts)}. Hoop fits with free radii end "
-        f"at outer radii of {min(hoop):.2g} to {max(hoop):.2g} mm, which is no such segment: what they gain is the place of the largest "
-        f"tau. So the data speak for `axial`, with E_t/mu of {min(moduli):.2g} to {max(moduli):.2g} when the radii are free; the valley "
-        "of that fit is flat (a thicker tube of stiffer fibres does nearly as well), and E_t/mu is not the same in the three cases."
+        f"Sum of squared errors, hoop over axial ({', '.join(map(_case, TWISTING))}): {'; '.join(texts)}."
+        f" Hoop fits with free radii end at outer radii of {min(hoop):.2g} to {max(hoop):.2g} mm, which is no"
+        " such segment: what they gain is the place of the largest tau. So the data speak for `axial`, with"
+        f" E_t/mu of {min(moduli):.2g} to {max(moduli):.2g} when the radii are free; the valley of that fit"
+        " is flat (a thicker tube of stiffer fibres does nearly as well), and E_t/mu is not the same in the"
+        " three cases."
     )
 
 
@@ -226,14 +271,37 @@ def _paper_section(d):
     facts = dict(paper_tau=PAPER_TAU, paper_angle=PAPER_ANGLE, paper_10=PAPER_TAU_10KPA)
     lines = ["", "## The paper's numbers", "", *_prose(ANCHORS, **facts), ""]
     rows = [
-        [f"{r['modulus']:g}", f"{r['ratio']:g}", f"{r['outer_radius']:.2f}", f"{r['angle']:g}", f"{r['largest'][0]:.4f}"]
+        [
+            f"{r['modulus']:g}",
+            f"{r['ratio']:g}",
+            f"{r['outer_radius']:.2f}",
+            f"{r['angle']:g}",
+            f"{r['largest'][0]:.4f}",
+        ]
         + [f"{r['stretch']:.3f}"]
         for r in d["paper_tubes"]
     ]
-    lines += table(["E_t/mu", "Ri/Ro", "Ro, mm", "largest tau at, deg", "largest tau at 10 kPa, rad/mm", "stretch there at 50 kPa"], rows)
+    lines += table(
+        [
+            "E_t/mu",
+            "Ri/Ro",
+            "Ro, mm",
+            "largest tau at, deg",
+            "largest tau at 10 kPa, rad/mm",
+            "stretch there at 50 kPa",
+        ],
+        rows,
+    )
     printed, largest = d["printed"], d["printed"]["largest_twist"][0]
-    medians = [100 * np.median(row["distance"]) for rows in d["tubes"].values() for row in rows if row["fitted"] == "printed E_t"]
-    states = np.concatenate([_array(row["tau"]) for rows in d["tubes"].values() for row in rows if row["fitted"] == "printed E_t"])
+    medians = [
+        100 * np.median(row["distance"])
+        for rows in d["tubes"].values()
+        for row in rows
+        if row["fitted"] == "printed E_t"
+    ]
+    states = np.concatenate(
+        [_array(row["tau"]) for rows in d["tubes"].values() for row in rows if row["fitted"] == "printed E_t"]
+    )
     facts = dict(
         lost=100 * np.isnan(states).mean(),
         largest=largest,
@@ -252,12 +320,26 @@ def _helix_section(d):
     axis, below, ours = _helix(strains, 0.0), _helix(strains, bottom), _helix(model, 0.0)
     lines = ["", "## Does P_t kappa_h = 2 pi cot(theta) hold?", "", *_prose(HELIX), ""]
     rows = [
-        [f"{angle:g}", *(f"{axis[i, j]:.2f} ({below[i, j]:.2f})" for j in (0, 2, 4)), *(f"{ours[i, j]:.2f}" for j in (0, 2, 4))]
+        [
+            f"{angle:g}",
+            *(f"{axis[i, j]:.2f} ({below[i, j]:.2f})" for j in (0, 2, 4)),
+            *(f"{ours[i, j]:.2f}" for j in (0, 2, 4)),
+        ]
         for i, angle in enumerate(ANGLES)
     ]
-    lines += table(["theta, deg", *(f"FE, {KPA[j]} kPa" for j in (0, 2, 4)), *(f"our model, {KPA[j]} kPa" for j in (0, 2, 4))], rows)
+    lines += table(
+        [
+            "theta, deg",
+            *(f"FE, {KPA[j]} kPa" for j in (0, 2, 4)),
+            *(f"our model, {KPA[j]} kPa" for j in (0, 2, 4)),
+        ],
+        rows,
+    )
     low, high = np.nanmin(axis), np.nanmax(axis)
-    text = f"It does not: in the cells the ratio is {low:.2f} to {high:.2f} on the channel's axis. It falls with pressure and depends on "
+    text = (
+        f"It does not: in the cells the ratio is {low:.2f} to {high:.2f} on the channel's axis. It falls with"
+        " pressure and depends on "
+    )
     text += "the line that one calls the centreline; at low pressure the helix is steeper than the strip's."
     lines += ["", *_prose(text)]
     lines += ["", "## Curvature", "", *_prose(SOFTNESS), ""]
@@ -273,7 +355,9 @@ def _summary_section(d):
     tau = _tau(d["cells"][SHOWN]["auto"])
     slopes = np.diff(np.concatenate([np.zeros((len(tau), 1)), tau], axis=1), axis=1)
     rows = _array(d["cells"][SHOWN]["auto"])
-    rises = np.diff(np.concatenate([np.ones((len(tau), 1)), np.linalg.norm(rows[..., :3], axis=-1)], axis=1), axis=1)
+    rises = np.diff(
+        np.concatenate([np.ones((len(tau), 1)), np.linalg.norm(rows[..., :3], axis=-1)], axis=1), axis=1
+    )
     free = _tau(d["cells"][SHOWN]["none"])
     paper = [ANGLES.index(a) for a in (75.0, 60.0, 45.0)]
     added = ", ".join(f"{100 * (tau[i, -1] / free[i, -1] - 1):.0f} % at {ANGLES[i]:g}" for i in paper)
@@ -284,31 +368,65 @@ def _summary_section(d):
     names = ", ".join(map(_case, TWISTING))
     largest = [np.nanmax(_tau(d["cells"][name]["auto"])) for name in TWISTING]
     points = [
-        "*3a, experiments*: no numbers are given, nothing to compare with. *3b, 3c*: shapes; ours are of other dimensions.",
-        f"*3d, tau(P)*: in the cells of {_case(SHOWN)} with contact the slope of tau falls at {sum(falls)} of the three angles 75, 60, 45 "
-        f"degrees, and that of the stretch rises at {sum(grows)}. The consistent tube has the second; no tube on this page has the first. "
-        "The curves' numbers are only in the picture.",
-        f"*Contact as the reason for the misfit at 45 degrees*: contact adds {added} degrees to the twist at 50 kPa in {_case(SHOWN)}: it "
-        f"is largest at {ANGLES[most]:g}, and no reason for 45 degrees alone to be off.",
-        f"*3e, 3f, the maximum*: the tube with axial fibres has it near {PAPER_ANGLE:g} degrees, and a size can be found for {PAPER_TAU:g} "
-        "rad/mm (table above); the printed constants give a tenth or less. The cells do not have it there, but, at 50 kPa with contact, "
-        f"at {'; '.join(at)} deg (rad/m) in {names}.",
-        f"*Magnitude*: the cells' largest twist is {min(largest):.0f} to {max(largest):.0f} rad/m at 50 kPa, the paper's 33: of the same "
-        "order, and more cannot be said without its dimensions.",
-        "*E_t = 0.008 MPa*: not reproduced: the printed equations have no solution, the consistent form no such twist (either convention).",
-        "Not tried: geometries other than the three cases, friction, the experiment's clamped ends, materials other than neo-Hookean.",
+        (
+            "*3a, experiments*: no numbers are given, nothing to compare with. *3b, 3c*: shapes; ours are of"
+            " other dimensions."
+        ),
+        (
+            f"*3d, tau(P)*: in the cells of {_case(SHOWN)} with contact the slope of tau falls at"
+            f" {sum(falls)} of the three angles 75, 60, 45 degrees, and that of the stretch rises at"
+            f" {sum(grows)}. The consistent tube has the second; no tube on this page has the first. The"
+            " curves' numbers are only in the picture."
+        ),
+        (
+            f"*Contact as the reason for the misfit at 45 degrees*: contact adds {added} degrees to the twist"
+            f" at 50 kPa in {_case(SHOWN)}: it is largest at {ANGLES[most]:g}, and no reason for 45 degrees"
+            " alone to be off."
+        ),
+        (
+            f"*3e, 3f, the maximum*: the tube with axial fibres has it near {PAPER_ANGLE:g} degrees, and a"
+            f" size can be found for {PAPER_TAU:g} rad/mm (table above); the printed constants give a tenth"
+            f" or less. The cells do not have it there, but, at 50 kPa with contact, at {'; '.join(at)} deg"
+            f" (rad/m) in {names}."
+        ),
+        (
+            f"*Magnitude*: the cells' largest twist is {min(largest):.0f} to {max(largest):.0f} rad/m at 50"
+            " kPa, the paper's 33: of the same order, and more cannot be said without its dimensions."
+        ),
+        (
+            "*E_t = 0.008 MPa*: not reproduced: the printed equations have no solution, the consistent form"
+            " no such twist (either convention)."
+        ),
+        (
+            "Not tried: geometries other than the three cases, friction, the experiment's clamped ends,"
+            " materials other than neo-Hookean."
+        ),
     ]
     lines = ["", "## Fig. 3: what could be reproduced and what not", ""]
-    return lines + [line for point in points for line in textwrap.wrap(f"- {point}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)]
+    return lines + [
+        line
+        for point in points
+        for line in textwrap.wrap(f"- {point}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    ]
 
 
 def page(meta, folder):
     """Text of paper-models.md; its picture goes to `folder`."""
     d = meta["paper"]["details"]
     _picture(d, folder / PICTURE)
-    made = "Made by `make bench ONLY=paper` and `python -m benchmarks --snapshot` (benchmarks/paper.py); do not edit."
+    made = (
+        "Made by `make bench ONLY=paper` and `python -m benchmarks --snapshot` (benchmarks/paper.py); do not"
+        " edit."
+    )
     lines = ["# The paper's models beside finite elements", "", made, "", *_prose(ABOUT), ""]
-    for section in (_cells_section, _twist_section, _tube_section, _paper_section, _helix_section, _summary_section):
+    for section in (
+        _cells_section,
+        _twist_section,
+        _tube_section,
+        _paper_section,
+        _helix_section,
+        _summary_section,
+    ):
         lines += section(d)
     return "\n".join(lines) + "\n"
 
@@ -340,13 +458,19 @@ def _picture(d, path):
             label = f"{row['tube']['fibre_convention']}, {_fit_name(row)}"
             models.plot(ANGLES, 1e3 * _array(row["tau"])[:, 2], style, label=label)
     models.axvline(PAPER_ANGLE, color="0.7", linewidth=1)
-    models.set(title=f"{_case(CHECKED)}, {KPA[2]} kPa; line: the paper's 53 deg", xlabel="theta, deg", ylabel="tau, rad/m")
+    models.set(
+        title=f"{_case(CHECKED)}, {KPA[2]} kPa; line: the paper's 53 deg",
+        xlabel="theta, deg",
+        ylabel="tau, rad/m",
+    )
     strains, model = _array(d["cells"][ONE_SIDED]["auto"]), _array(d["bending"]["model"])
     for color, j in enumerate((0, 2, 4)):
         helix.plot(ANGLES, _helix(strains, 0.0)[:, j], "o-", color=f"C{color}", label=f"FE, {KPA[j]} kPa")
         helix.plot(ANGLES, _helix(model, 0.0)[:, j], "--", color=f"C{color}")
     helix.axhline(1.0, color="0.7", linewidth=1)
-    helix.set(title="one-sided-w10; dashed: our model", xlabel="theta, deg", ylabel="P_t kappa_h / (2 pi cot theta)")
+    helix.set(
+        title="one-sided-w10; dashed: our model", xlabel="theta, deg", ylabel="P_t kappa_h / (2 pi cot theta)"
+    )
     for axes in (over_angle, over_pressure, models, helix):
         axes.legend(fontsize=8)
     figure.tight_layout()

@@ -1,5 +1,5 @@
-"""How much of the law's error is the chance of a mesh: held-out cells computed once more on another mesh of nearly the same size, judged
-against the first as the law is.
+"""How much of the law's error is the chance of a mesh: held-out cells computed once more on another mesh of
+nearly the same size, judged against the first as the law is.
 """
 
 from dataclasses import replace
@@ -31,7 +31,9 @@ def remeshed():
     mesh = replace(coarse, settings={"mesh_size_mm": MESH_SIZE})
     held_out = [d for d in campaign.designs if d.held_out and d.mesh is coarse and d.index < BELOW]
     other = {"mesh": mesh.settings, "prescribed": []}
-    designs = tuple(replace(d, mesh=mesh, case=replace(d.case, inputs=d.case.inputs | other)) for d in held_out)
+    designs = tuple(
+        replace(d, mesh=mesh, case=replace(d.case, inputs=d.case.inputs | other)) for d in held_out
+    )
     FOLDER.mkdir(parents=True, exist_ok=True)
     gathering = Gathering(replace(campaign, designs=designs, meshes=(mesh,)), FOLDER, Known())
     run_cases([d.case for d in designs], FOLDER / "cases", campaign.limits, on_record=gathering.add)
@@ -40,7 +42,10 @@ def remeshed():
         first, second = (sample_of(cells, kind, True).on(0).free for cells in (data, again))
         first = first.of(np.isin(first.design, second.design))
         law = replace(laws[kind], level=0)
-        by_law = law.free_strains(first.shape, first.pressure), law.free_stiffness(first.shape, first.pressure)
+        by_law = (
+            law.free_strains(first.shape, first.pressure),
+            law.free_stiffness(first.shape, first.pressure),
+        )
         details[kind] = {
             "designs": len(np.unique(first.design)),
             "another mesh": percentiles(first, *at_pressures_of(first, second)),
@@ -52,14 +57,16 @@ def remeshed():
 
 
 def at_pressures_of(first, second):
-    """(strains (n, 6), stiffness (n, 6, 6)) of the second States at the pressures of the first, which differ a little where both are
-    parts of their own limit loads."""
+    """(strains (n, 6), stiffness (n, 6, 6)) of the second States at the pressures of the first, which differ
+    a little where both are parts of their own limit loads."""
     strains, K = np.empty(first.strains.shape), np.empty(first.matrices.shape)
     for number in np.unique(first.design):
         rows, b = first.design == number, second.of(second.design == number)
         for out, values in ((strains, b.strains), (K, b.matrices)):
             flat = values.reshape(len(values), -1).T
-            out[rows] = np.column_stack([np.interp(first.pressure[rows], b.pressure, v) for v in flat]).reshape(out[rows].shape)
+            out[rows] = np.column_stack(
+                [np.interp(first.pressure[rows], b.pressure, v) for v in flat]
+            ).reshape(out[rows].shape)
     return strains, K
 
 
@@ -69,15 +76,18 @@ def percentiles(states, strains, K):
 
     loaded, stiffness = states.pressure > 0, stiffness_error(states, symmetric(K))
     strain, tip = (error(states, strains)[loaded] for error in (strain_error, tip_error))
-    return {name: float(np.percentile(e, 95)) for name, e in zip(FIGURES, (strain, tip, stiffness, stiffness[states.touching]))}
+    return {
+        name: float(np.percentile(e, 95))
+        for name, e in zip(FIGURES, (strain, tip, stiffness, stiffness[states.touching]))
+    }
 
 
 def lines(details):
     """Lines of docs/rod-law.md."""
     text = (
-        "A mesh is one of many: 95th percentiles of the differences between cells on two meshes of nearly the same size, 2 and "
-        f"{MESH_SIZE:g} mm, beside those of the law against the first, for the same held-out designs (those below index {BELOW}); defined "
-        "as the figures below."
+        "A mesh is one of many: 95th percentiles of the differences between cells on two meshes of nearly"
+        f" the same size, 2 and {MESH_SIZE:g} mm, beside those of the law against the first, for the same"
+        f" held-out designs (those below index {BELOW}); defined as the figures below."
     )
     rows = [
         (f"{kind}, {found['designs']} designs", who, *[f"{found[who][name]:.2%}" for name in FIGURES])

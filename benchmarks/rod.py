@@ -1,4 +1,5 @@
-"""Figures of the rod: what free and loaded shapes cost, and how far they are from finite elements of the same mesh size."""
+"""Figures of the rod: what free and loaded shapes cost, and how far they are from finite elements of the same
+mesh size."""
 
 import tempfile
 import time
@@ -16,7 +17,8 @@ TOP = 0.05
 
 
 def best_seconds(call, calls):
-    """Smallest mean of 15 rows of calls, CPU s a call (one thread): other work on the machine only ever adds."""
+    """Smallest mean of 15 rows of calls, CPU s a call (one thread): other work on the machine only ever
+    adds."""
     best = np.inf
     for _ in range(15):
         start = time.process_time()
@@ -73,13 +75,16 @@ def speed():
 def compare(rod, loads, fe):
     """(tip, RMS) distance of the rod's section frames from the measured ones, over the length at rest."""
     line = rod.equilibrium(loads).line
-    apart = np.linalg.norm(line.at(np.minimum(fe.stations, line.s[-1]))[:, :3, 3] - fe.frames[:, :3, 3], axis=1)
+    apart = np.linalg.norm(
+        line.at(np.minimum(fe.stations, line.s[-1]))[:, :3, 3] - fe.frames[:, :3, 3], axis=1
+    )
     length = rod.lengths.sum()
     return float(apart[-1] / length), float(np.sqrt(np.mean(apart**2)) / length)
 
 
 def against_finite_elements():
-    """The part `rod-fe`: laws from the unit cells' states, bodies of five chambers, one mesh size; beside it the trained law."""
+    """The part `rod-fe`: laws from the unit cells' states, bodies of five chambers, one mesh size; beside it
+    the trained law."""
     from geometry import Manipulator
     from geometry.loading import DeadLoads
     from geometry.mesh import mesh_manipulator
@@ -94,24 +99,45 @@ def against_finite_elements():
         for name, angle in (("one_sided_w10", 60.0), ("one_sided_w10", 90.0), ("twist_w12", 60.0)):
             body = Manipulator((CASES[name](angle=angle, chambers=5),))
             states = []
-            solve_cell(CellCase(replace(body.segments[0], chambers=1), TOP, MESH_SIZE, 10), Path(folder) / "cell.msh", states.append)
+            solve_cell(
+                CellCase(replace(body.segments[0], chambers=1), TOP, MESH_SIZE, 10),
+                Path(folder) / "cell.msh",
+                states.append,
+            )
             law = QuadraticLaw.of_states(states)
-            push = 0.6 * law.stiffnesses[0][4, 4] / body.length**2  # moves the tips by 20 to 26 % of the length
+            # moves the tips by 20 to 26 % of the length
+            push = 0.6 * law.stiffnesses[0][4, 4] / body.length**2
             mesh_manipulator(body, MESH_SIZE, folder)
             for what, loads, top in (
                 ("free", DeadLoads(), TOP),
                 ("hanging", DeadLoads((0.0, 0.0, -9810.0)), SHARES[0] * TOP),
                 ("pushed", DeadLoads(tip_force=(0.0, 0.0, push)), SHARES[0] * TOP),
             ):
-                solve, marks, seen = ManipulatorSolve(body, Path(folder) / "manipulator.msh", loads=loads), [s * TOP for s in SHARES], []
+                solve, marks, seen = (
+                    ManipulatorSolve(body, Path(folder) / "manipulator.msh", loads=loads),
+                    [s * TOP for s in SHARES],
+                    [],
+                )
                 solve.run(top, seen.append, [m for m in marks if m <= top], stability=False)
                 solve.destroy()
                 for fe in [m for m in seen if m.pressure in marks]:
                     tip, rms = compare(Rod.of(body, law, fe.pressure), loads, fe)
                     bare_tip, bare_rms = compare(Rod.of(body, law, fe.pressure, end_effects=False), loads, fe)
-                    trained_tip, trained_rms = compare(Rod.of(body, trained.of(body.segments[0]), fe.pressure), loads, fe)
-                    row = {"case": f"{name}, {angle:g} deg, {what}", "pressure_kPa": fe.pressure * 1e3, "tip": tip, "rms": rms}
-                    row |= {"tip_without": bare_tip, "rms_without": bare_rms, "tip_trained": trained_tip, "rms_trained": trained_rms}
+                    trained_tip, trained_rms = compare(
+                        Rod.of(body, trained.of(body.segments[0]), fe.pressure), loads, fe
+                    )
+                    row = {
+                        "case": f"{name}, {angle:g} deg, {what}",
+                        "pressure_kPa": fe.pressure * 1e3,
+                        "tip": tip,
+                        "rms": rms,
+                    }
+                    row |= {
+                        "tip_without": bare_tip,
+                        "rms_without": bare_rms,
+                        "tip_trained": trained_tip,
+                        "rms_trained": trained_rms,
+                    }
                     rows.append(row)
                     print("  ", rows[-1], flush=True)
     figures = {
@@ -132,6 +158,15 @@ def page(text, details):
         return f"{100 * row['tip' + which]:.1f}; {100 * row['rms' + which]:.1f}"
 
     ways = {"with end effects": "", "without": "_without", "trained law": "_trained"}
-    rows = [(r["case"], f"{r['pressure_kPa']:.0f}", *[percent(r, way) for way in ways.values()]) for r in details["rows"]]
-    units = f"Distances in % of the length: tip; RMS of the section frames. h = {details['mesh_size_mm']:g} mm."
-    return below_mark(text, "rod-fe", ["## Rods against finite elements", "", units, "", *table(["case", "kPa", *ways], rows)])
+    rows = [
+        (r["case"], f"{r['pressure_kPa']:.0f}", *[percent(r, way) for way in ways.values()])
+        for r in details["rows"]
+    ]
+    units = (
+        f"Distances in % of the length: tip; RMS of the section frames. h = {details['mesh_size_mm']:g} mm."
+    )
+    return below_mark(
+        text,
+        "rod-fe",
+        ["## Rods against finite elements", "", units, "", *table(["case", "kPa", *ways], rows)],
+    )

@@ -1,4 +1,5 @@
-"""The unit cell against finite segments of 9 and 30 chambers: what a step costs, and the strains in the middle."""
+"""The unit cell against finite segments of 9 and 30 chambers: what a step costs, and the strains in the
+middle."""
 
 import tempfile
 import time
@@ -21,13 +22,17 @@ def segment(chambers):
 
 
 def walk(system, path, pressure, levels):
-    """Process seconds a converged step in equal steps to `pressure`, the tangent factorised and measured nowhere but by Newton."""
+    """Process seconds a converged step in equal steps to `pressure`, the tangent factorised and measured
+    nowhere but by Newton."""
     from hifi.stepping import StepSize, run_steps
 
     step = pressure / levels
     begun = time.process_time()
     result = run_steps(path, pressure, StepSize(step, 1e-3 * step, largest=step))
-    return (time.process_time() - begun) / len(result.steps), {"steps": len(result.steps), "factorisations": system.factorisations}
+    return (time.process_time() - begun) / len(result.steps), {
+        "steps": len(result.steps),
+        "factorisations": system.factorisations,
+    }
 
 
 def cell_step(folder):
@@ -64,13 +69,17 @@ def finite(folder, chambers, mesh_size):
 
 
 def middle(folder):
-    """{pressure: (e (3,), k (3,))} over the two pitches around the middle chamber of the 9-chamber segment at STRAIN_MESH."""
+    """{pressure: (e (3,), k (3,))} over the two pitches around the middle chamber of the 9-chamber segment at
+    STRAIN_MESH."""
     from base import se3
     from base.strains import RodStrains
 
     solve = finite(folder, CHAMBERS[0], STRAIN_MESH)
     stations = solve.sections.segment_stations[0]
-    ends = [int(np.argmin(abs(solve.sections.stations - s))) for s in (stations[CHAMBERS[0] // 2 - 1], stations[CHAMBERS[0] // 2 + 1])]
+    ends = [
+        int(np.argmin(abs(solve.sections.stations - s)))
+        for s in (stations[CHAMBERS[0] // 2 - 1], stations[CHAMBERS[0] // 2 + 1])
+    ]
     seen = {}
 
     def note(m):
@@ -99,19 +108,39 @@ def against_segments():
     pitch, errors, rows = segment(1).pitch, [], []
     for pressure, (e, k) in found.items():
         state = min(states, key=lambda s: abs(s.pressure - pressure))
-        here, there = (np.concatenate([e, k * pitch]) for e, k in ((state.strains.e, state.strains.k), (e, k)))
+        here, there = (
+            np.concatenate([e, k * pitch]) for e, k in ((state.strains.e, state.strains.k), (e, k))
+        )
         errors.append(float(np.linalg.norm(here - there) / (np.linalg.norm(k) * pitch)))
-        rows.append({"pressure_kPa": pressure * 1e3, "cell": here.tolist(), "middle_of_9": there.tolist(), "difference_rel": errors[-1]})
+        rows.append(
+            {
+                "pressure_kPa": pressure * 1e3,
+                "cell": here.tolist(),
+                "middle_of_9": there.tolist(),
+                "difference_rel": errors[-1],
+            }
+        )
     figures = {f"cell_vs_{n}_segment_step_cost_ratio": costs["cell"][0] / costs[n][0] for n in CHAMBERS}
     figures["cell_vs_segment_strain_rel"] = max(errors)
-    details = {"cost": {str(n): {"seconds_a_step": s, **facts} for n, (s, facts) in costs.items()}, "strains_e_k_pitch": rows, "dofs": dofs}
+    details = {
+        "cost": {str(n): {"seconds_a_step": s, **facts} for n, (s, facts) in costs.items()},
+        "strains_e_k_pitch": rows,
+        "dofs": dofs,
+    }
     return figures, details
 
 
 def section(details):
     """Lines on cell and segments for docs/verification.md."""
     names = ["e1", "e2", "e3", "k1 pitch", "k2 pitch", "k3 pitch"]
-    lines = ["", f"Strains at a mesh of {STRAIN_MESH:g} mm ({details['dofs']} dofs in the segment), where the middle is two pitches:", ""]
+    lines = [
+        "",
+        (
+            f"Strains at a mesh of {STRAIN_MESH:g} mm ({details['dofs']} dofs in the segment), where the"
+            " middle is two pitches:"
+        ),
+        "",
+    ]
     lines = ["## The unit cell and finite segments", *lines]
     rows = []
     for r in details["strains_e_k_pitch"]:
@@ -120,6 +149,16 @@ def section(details):
         rows[-1].append(f"{r['difference_rel']:.2e}")
         rows[-2].append("")
     lines += table(["kPa", "body", *names, "difference over k pitch"], rows)
-    lines += ["", f"Cost of a step of {COST_PRESSURE / COST_LEVELS * 1e3:g} kPa at {COST_MESH:g} mm, processor seconds, same Newton:", ""]
-    costs = [[n, c["unknowns"], c["steps"], c["factorisations"], f"{c['seconds_a_step']:.2f}"] for n, c in details["cost"].items()]
+    lines += [
+        "",
+        (
+            f"Cost of a step of {COST_PRESSURE / COST_LEVELS * 1e3:g} kPa at {COST_MESH:g} mm, processor"
+            " seconds, same Newton:"
+        ),
+        "",
+    ]
+    costs = [
+        [n, c["unknowns"], c["steps"], c["factorisations"], f"{c['seconds_a_step']:.2f}"]
+        for n, c in details["cost"].items()
+    ]
     return lines + table(["chambers", "unknowns", "steps", "factorisations", "s a step"], costs)

@@ -1,7 +1,8 @@
-"""What real silicones change: unit cells of Yeoh laws fitted to tensile tests against neo-Hookean ones of the same initial modulus.
+"""What real silicones change: unit cells of Yeoh laws fitted to tensile tests against neo-Hookean ones of the
+same initial modulus.
 
-The trained law knows the neo-Hookean material alone; for any other it takes the initial modulus. Both sides are finite elements on one
-mesh, so that the material is all that differs.
+The trained law knows the neo-Hookean material alone; for any other it takes the initial modulus. Both sides
+are finite elements on one mesh, so that the material is all that differs.
 """
 
 import tempfile
@@ -12,9 +13,14 @@ import numpy as np
 
 from benchmarks.tables import table
 
-#: name -> (c10, c20), MPa: `pneunet fit-material TEST.csv --law Yeoh --to-strain-percent 150` on raw tests of the Soft Robotics Materials
-#: Database (Marechal et al. 2021, Open Database License): the softest, a middle one, and the one that stiffens most of five tried
-YEOH = {"Ecoflex 00-30": (0.0077885, 0.000111618), "Mold Star 16 FAST": (0.0416103, 0.00283521), "Dragon Skin 10": (0.0229549, 0.00226592)}
+#: name -> (c10, c20), MPa: `pneunet fit-material TEST.csv --law Yeoh --to-strain-percent 150` on raw tests of
+#: the Soft Robotics Materials Database (Marechal et al. 2021, Open Database License): the softest, a middle
+#: one, and the one that stiffens most of five tried
+YEOH = {
+    "Ecoflex 00-30": (0.0077885, 0.000111618),
+    "Mold Star 16 FAST": (0.0416103, 0.00283521),
+    "Dragon Skin 10": (0.0229549, 0.00226592),
+}
 DESIGNS = (("one_sided_w10", 60.0), ("one_sided_w10", 90.0), ("twist_w12", 60.0))
 MESH_SIZE = 2.0
 LEVELS = (0.05, 0.1, 0.15, 0.2)  # P/mu
@@ -28,7 +34,11 @@ def free_strains(segment):
 
     states = []
     with tempfile.TemporaryDirectory() as folder:
-        solve_cell(CellCase(segment, LEVELS[-1] * segment.material.mu, MESH_SIZE, len(LEVELS)), Path(folder) / "cell.msh", states.append)
+        solve_cell(
+            CellCase(segment, LEVELS[-1] * segment.material.mu, MESH_SIZE, len(LEVELS)),
+            Path(folder) / "cell.msh",
+            states.append,
+        )
     scale, loaded = normal_pitch(segment), [s for s in states if s.pressure > 0]
     return np.array([[*s.strains.e, *(s.strains.k * scale)] for s in loaded])
 
@@ -48,8 +58,15 @@ def silicones():
             rows.append({"design": f"{name}, {angle:g} deg", "silicone": silicone, "error": error.tolist()})
             print("  ", rows[-1], flush=True)
     worst = np.max([r["error"] for r in rows], axis=0)
-    figures = {"law_real_silicone_strain_rel_01": worst[LEVELS.index(0.1)], "law_real_silicone_strain_rel_02": worst[LEVELS.index(0.2)]}
-    return {key: float(value) for key, value in figures.items()}, {"mesh_size_mm": MESH_SIZE, "levels": LEVELS, "rows": rows}
+    figures = {
+        "law_real_silicone_strain_rel_01": worst[LEVELS.index(0.1)],
+        "law_real_silicone_strain_rel_02": worst[LEVELS.index(0.2)],
+    }
+    return {key: float(value) for key, value in figures.items()}, {
+        "mesh_size_mm": MESH_SIZE,
+        "levels": LEVELS,
+        "rows": rows,
+    }
 
 
 def lines(details):
@@ -57,8 +74,9 @@ def lines(details):
     head = ["design", "silicone", *[f"P/mu = {p:g}" for p in details["levels"]]]
     rows = [(r["design"], r["silicone"], *[f"{e:.1%}" for e in r["error"]]) for r in details["rows"]]
     text = (
-        "Free strains of unit cells of real silicones (Yeoh laws fitted to tensile tests of the Soft Robotics Materials Database, Marechal "
-        "et al. 2021, ODbL) against neo-Hookean ones of the same initial modulus, which is what the law takes: norm of the difference of "
-        f"(e, k l) over that of the free strains, finite elements on both sides, h = {details['mesh_size_mm']:g} mm."
+        "Free strains of unit cells of real silicones (Yeoh laws fitted to tensile tests of the Soft"
+        " Robotics Materials Database, Marechal et al. 2021, ODbL) against neo-Hookean ones of the same"
+        " initial modulus, which is what the law takes: norm of the difference of (e, k l) over that of the"
+        f" free strains, finite elements on both sides, h = {details['mesh_size_mm']:g} mm."
     )
     return ["## Other materials", "", text, "", *table(head, rows), ""]

@@ -1,7 +1,9 @@
-"""How fast the finite elements are: against FElupe and NGSolve on the same mesh, over mesh size, on two ranks.
+"""How fast the finite elements are: against FElupe and NGSolve on the same mesh, over mesh size, on two
+ranks.
 
-Every measurement is a process of its own, one after another, one thread a rank, the codes in turn; the least wall seconds
-count, all of them are kept in the details (results.meta.json), process seconds too. `page` writes docs/speed.md.
+Every measurement is a process of its own, one after another, one thread a rank, the codes in turn; the least
+wall seconds count, all of them are kept in the details (results.meta.json), process seconds too. `page`
+writes docs/speed.md.
 """
 
 import json
@@ -36,7 +38,11 @@ def work(code, task, size, *more, ranks=1):
     """Facts (a dict) that benchmarks/rivals/worker.py prints about this code, task and mesh size."""
     arguments = [str(a) for a in (WORKER, code, task, mesh(size), *more)]
     if code == "pneunet":
-        command = launch.command_line(ranks, ["--", sys.executable, *arguments]) if ranks > 1 else [sys.executable, *arguments]
+        command = (
+            launch.command_line(ranks, ["--", sys.executable, *arguments])
+            if ranks > 1
+            else [sys.executable, *arguments]
+        )
         variables = launch.environment() | environment.ONE_THREAD | {"PYTHONPATH": str(ROOT)}
     else:
         command, variables = [environment.python(), *arguments], environment.variables()
@@ -44,12 +50,17 @@ def work(code, task, size, *more, ranks=1):
     if done.returncode:
         sys.exit(f"bench: {code} {task} at {size:g} mm failed: {done.stderr.strip()[-500:]}")
     facts = json.loads(done.stdout.strip().splitlines()[-1])
-    print(f"  {code} {task} h={size:g} ranks={ranks}: {facts['seconds']:.2f} s, of the processor {facts['cpu_seconds']:.2f}", flush=True)
+    print(
+        f"  {code} {task} h={size:g} ranks={ranks}: {facts['seconds']:.2f} s, of the processor"
+        f" {facts['cpu_seconds']:.2f}",
+        flush=True,
+    )
     return facts
 
 
 def in_turn(runs, repeats):
-    """{label: facts of its fastest run, with all seconds} of runs {label: (code, task, size, *more)}, the labels in turn."""
+    """{label: facts of its fastest run, with all seconds} of runs {label: (code, task, size, *more)}, the
+    labels in turn."""
     done = {label: [] for label in runs}
     for _ in range(repeats):
         for label, arguments in runs.items():
@@ -60,7 +71,12 @@ def in_turn(runs, repeats):
 def noted(all_of_it):
     best = min(all_of_it, key=lambda facts: facts["seconds"])
     wall, cpu = ([facts[name] for facts in all_of_it] for name in ("seconds", "cpu_seconds"))
-    return best | {"all_seconds": wall, "all_cpu_seconds": cpu, "median_seconds": float(np.median(wall)), "largest_seconds": max(wall)}
+    return best | {
+        "all_seconds": wall,
+        "all_cpu_seconds": cpu,
+        "median_seconds": float(np.median(wall)),
+        "largest_seconds": max(wall),
+    }
 
 
 def ratio(ours, theirs):
@@ -82,13 +98,21 @@ def ramps():
         "ramp_ratio_stock_h2": ratio(h2["pneunet", "best"], [h2[code, "stock"] for code in RIVALS]),
         "ramp_factorisations_h1": h1["pneunet", "best"]["factorisations"],
     }
-    found = [(size, *label, facts) for size, by_label in ((2.0, h2), (1.0, h1)) for label, facts in by_label.items()]
-    runs = [{"mesh_size_mm": size, "code": code, "strategy": strategy, **facts} for size, code, strategy, facts in found]
+    found = [
+        (size, *label, facts)
+        for size, by_label in ((2.0, h2), (1.0, h1))
+        for label, facts in by_label.items()
+    ]
+    runs = [
+        {"mesh_size_mm": size, "code": code, "strategy": strategy, **facts}
+        for size, code, strategy, facts in found
+    ]
     return figures | agreement(), {"runs": runs}
 
 
 def agreement():
-    """Relative difference (2-norm over common points) of the displacements at 50 kPa, tight tolerance, h = 2 mm."""
+    """Relative difference (2-norm over common points) of the displacements at 50 kPa, tight tolerance, h = 2
+    mm."""
     from scipy.spatial import cKDTree
 
     found = {}
@@ -104,12 +128,15 @@ def agreement():
         distance, which = tree.query(found[code]["points"])
         assert distance.max() < 1e-9, "not the same mesh"
         theirs = found[code]["displacements"]
-        figures[f"{code}_agreement_rel"] = float(np.linalg.norm(ours["displacements"][which] - theirs) / np.linalg.norm(theirs))
+        figures[f"{code}_agreement_rel"] = float(
+            np.linalg.norm(ours["displacements"][which] - theirs) / np.linalg.norm(theirs)
+        )
     return figures
 
 
 def scaling():
-    """(figures, details): seconds of our operations on three meshes and the exponents of their growth with the dofs."""
+    """(figures, details): seconds of our operations on three meshes and the exponents of their growth with
+    the dofs."""
     rows = [{"mesh_size_mm": size, **work("pneunet", "operations", size)} for size in SCALING_MESHES]
     dofs = np.log([row["dofs"] for row in rows])
     exponents = {name: np.polyfit(dofs, np.log([row[name] for row in rows]), 1)[0] for name in OPERATIONS}
@@ -117,43 +144,67 @@ def scaling():
 
 
 def two_ranks():
-    """(figures, details): the first two steps of the ramp at some 150k dofs on one and on two ranks, best of two."""
+    """(figures, details): the first two steps of the ramp at some 150k dofs on one and on two ranks, best of
+    two."""
     done = {1: [], 2: []}
     for _ in range(2):
         for ranks, all_of_it in done.items():
             all_of_it.append(work("pneunet", "begin", RANKS_MESH, ranks=ranks))
     facts = {ranks: noted(all_of_it) for ranks, all_of_it in done.items()}
-    return {"ranks2_speedup_150k": facts[1]["seconds"] / facts[2]["seconds"]}, {"ranks": [{"ranks": r, **f} for r, f in facts.items()]}
+    return {"ranks2_speedup_150k": facts[1]["seconds"] / facts[2]["seconds"]}, {
+        "ranks": [{"ranks": r, **f} for r, f in facts.items()]
+    }
 
 
 def page(results, meta):
     """docs/speed.md from the figures and the details of the parts; parts not measured are left out."""
     details = {part: meta.get(part, {}).get("details", {}) for part in ("speed", "scaling", "ranks2")}
-    lines = ["# Speed", "", "Made by `make bench` and `python -m benchmarks --snapshot` (benchmarks/speed.py); do not edit.", "", *ABOUT]
+    lines = [
+        "# Speed",
+        "",
+        "Made by `make bench` and `python -m benchmarks --snapshot` (benchmarks/speed.py); do not edit.",
+        "",
+        *ABOUT,
+    ]
     if details["speed"]:
-        lines += ["", "## The same ramp in three codes", "", *_ramp_table(details["speed"]["runs"]), "", *_figures(results, RAMP_FIGURES)]
+        lines += [
+            "",
+            "## The same ramp in three codes",
+            "",
+            *_ramp_table(details["speed"]["runs"]),
+            "",
+            *_figures(results, RAMP_FIGURES),
+        ]
     if details["scaling"]:
-        lines += ["", "## Our operations over the number of unknowns", "", *_scaling_table(results, details["scaling"]["operations"])]
+        lines += [
+            "",
+            "## Our operations over the number of unknowns",
+            "",
+            *_scaling_table(results, details["scaling"]["operations"]),
+        ]
     if details["ranks2"]:
         lines += ["", "## Two ranks", "", *_ranks_table(results, details["ranks2"]["ranks"])]
     return "\n".join(lines) + "\n"
 
 
 ABOUT = """\
-Problem: case twist-w12 (60 degrees, three pairs of chambers), neo-Hookean, incompressible, P2/P1 on straight tetrahedra,
-clamped at its base, follower pressure 0 to 50 kPa, relative tolerance 1e-8 of the pressure load, quadrature of degree 4. All
-codes build the same vertices and cells; FElupe integrates with our rule, NGSolve with its own of 14 points.
+Problem: case twist-w12 (60 degrees, three pairs of chambers), neo-Hookean, incompressible, P2/P1 on
+straight tetrahedra, clamped at its base, follower pressure 0 to 50 kPa, relative tolerance 1e-8 of the
+pressure load, quadrature of degree 4. All codes build the same vertices and cells; FElupe integrates with
+our rule, NGSolve with its own of 14 points.
 
-Solvers: pneunet MUMPS LDL^T on OpenBLAS; FElupe (numpy assembly by its own integral forms, a hand-written energy, only the upper
-triangle assembled into a fixed pattern) and NGSolve (an energy compiled to C++, symmetric storage) MKL PARDISO LDL^T with METIS,
-two-level factorisation and no iterative refinement, the fastest of the settings tried for both (pypardiso's defaults take a
-quarter longer for the ramp; NGSolve's sparsecholesky and UMFPACK take 1.6 and 2.8 times as long for a factorisation at h = 1 mm).
-One thread each.
+Solvers: pneunet MUMPS LDL^T on OpenBLAS; FElupe (numpy assembly by its own integral forms, a hand-written
+energy, only the upper triangle assembled into a fixed pattern) and NGSolve (an energy compiled to C++,
+symmetric storage) MKL PARDISO LDL^T with METIS, two-level factorisation and no iterative refinement, the
+fastest of the settings tried for both (pypardiso's defaults take a quarter longer for the ramp; NGSolve's
+sparsecholesky and UMFPACK take 1.6 and 2.8 times as long for a factorisation at h = 1 mm). One thread
+each.
 
-Strategies: *same*: steps to 2.5, 5, 10 .. 50 kPa, quadratic extrapolation, a new factorisation when an iteration lowers the
-residual by less than 3.3 times. *best*: `hifi`'s own stepping (its factorisations include the tangent's assembly). *stock*: full
-Newton without predictor in steps of 2.5 kPa, the largest that arrive. Timed is the ramp: assembly, symbolic and numeric
-factorisation, solutions and updates, not meshing, imports, compilation and sparsity patterns.""".splitlines()
+Strategies: *same*: steps to 2.5, 5, 10 .. 50 kPa, quadratic extrapolation, a new factorisation when an
+iteration lowers the residual by less than 3.3 times. *best*: `hifi`'s own stepping (its factorisations
+include the tangent's assembly). *stock*: full Newton without predictor in steps of 2.5 kPa, the largest
+that arrive. Timed is the ramp: assembly, symbolic and numeric factorisation, solutions and updates, not
+meshing, imports, compilation and sparsity patterns.""".splitlines()
 RAMP_FIGURES = {
     "ramp_ratio_same_strategy_h2": "same strategy, h = 2 mm, ours over the faster of theirs",
     "ramp_ratio_same_strategy_h1": "same strategy, h = 1 mm",
@@ -165,17 +216,43 @@ RAMP_FIGURES = {
 
 
 def _figures(results, meaning):
-    return table(["what", "value"], [[text, f"{results[key]:.3g}"] for key, text in meaning.items() if key in results])
+    return table(
+        ["what", "value"], [[text, f"{results[key]:.3g}"] for key, text in meaning.items() if key in results]
+    )
 
 
 def _ramp_table(runs):
     rows = []
-    for f in sorted(runs, key=lambda f: (-f["mesh_size_mm"], ("same", "best", "stock").index(f["strategy"]), f["seconds"])):
+    for f in sorted(
+        runs, key=lambda f: (-f["mesh_size_mm"], ("same", "best", "stock").index(f["strategy"]), f["seconds"])
+    ):
         seconds = [f"{f[name]:.2f}" for name in ("seconds", "median_seconds", "largest_seconds")]
         parts = [f"{f['parts'][name]:.2f}" if name in f["parts"] else "" for name in OPERATIONS]
         counts = [f["iterations"], f["factorisations"]]
-        rows.append([f["mesh_size_mm"], f["dofs"], f["strategy"], NAMES[f["code"]], *seconds, f"{f['cpu_seconds']:.2f}", *counts, *parts])
-    head = ["h, mm", "dofs", "strategy", "code", "least s", "median", "largest", "processor s", "iterations", "factorisations"]
+        rows.append(
+            [
+                f["mesh_size_mm"],
+                f["dofs"],
+                f["strategy"],
+                NAMES[f["code"]],
+                *seconds,
+                f"{f['cpu_seconds']:.2f}",
+                *counts,
+                *parts,
+            ]
+        )
+    head = [
+        "h, mm",
+        "dofs",
+        "strategy",
+        "code",
+        "least s",
+        "median",
+        "largest",
+        "processor s",
+        "iterations",
+        "factorisations",
+    ]
     return table([*head, *(f"{name}, s" for name in OPERATIONS)], rows)
 
 
@@ -187,5 +264,8 @@ def _scaling_table(results, operations):
 
 def _ranks_table(results, runs):
     rows = [[f["ranks"], f["dofs"], f"{f['seconds']:.2f}", f"{f['largest_seconds']:.2f}"] for f in runs]
-    speedup = f"Two ranks are {results['ranks2_speedup_150k']:.2f} times as fast as one on the ramp's first two steps."
+    speedup = (
+        f"Two ranks are {results['ranks2_speedup_150k']:.2f} times as fast as one on the ramp's first two"
+        " steps."
+    )
     return [*table(["ranks", "dofs", "least s", "largest s"], rows), "", speedup]

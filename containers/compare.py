@@ -44,14 +44,18 @@ def main() -> int:
     parser.add_argument("one", type=Path)
     parser.add_argument("two", type=Path)
     parser.add_argument("--rtol", type=float, default=1e-6, help="relative tolerance (default %(default)s)")
-    parser.add_argument("--atol", type=float, default=1e-9, help="absolute tolerance, for zeros (default %(default)s)")
+    parser.add_argument(
+        "--atol", type=float, default=1e-9, help="absolute tolerance, for zeros (default %(default)s)"
+    )
     args = parser.parse_args()
     one, two = (dict(leaves(json.loads(path.read_text()))) for path in (args.one, args.two))
     if not any(is_number(value) for value in one.values()):
         print(f"{args.one}: no numbers to compare")
         return 1
     lines = differences(one, two, args.rtol, args.atol)
-    print(*lines, f"{len(lines)} of {len(one.keys() | two.keys())} values differ (rtol {args.rtol:g})", sep="\n")
+    print(
+        *lines, f"{len(lines)} of {len(one.keys() | two.keys())} values differ (rtol {args.rtol:g})", sep="\n"
+    )
     return 1 if lines else 0
 
 

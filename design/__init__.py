@@ -1,1 +1,2 @@
-"""What is wanted: a target curve in, a manipulator that follows it out, and the pictures and report that judge it."""
+"""What is wanted: a target curve in, a manipulator that follows it out, and the pictures and report that
+judge it."""

@@ -1,4 +1,5 @@
-"""Bodies to render: the reduced model's, the finite elements', curves as tubes (base.rendering makes pictures of them)."""
+"""Bodies to render: the reduced model's, the finite elements', curves as tubes (base.rendering makes pictures
+of them)."""
 
 import numpy as np
 
@@ -48,7 +49,8 @@ def read_solution(path):
 
 
 def facing_walls(surface):
-    """The part of a solution's surface where walls face each other across a gap (point data FIELD); None without any."""
+    """The part of a solution's surface where walls face each other across a gap (point data FIELD); None
+    without any."""
     if FIELD not in surface.point_data:
         return None
     facing = np.isfinite(surface.point_data[FIELD])

@@ -20,9 +20,9 @@ CONFIRMS, ROUGHLY = 2.0, 5.0
 class Comparison:
     """Curves (n, 3) in mm in target coordinates, and `Errors` between them; None where a part is missing.
 
-    reduced: at the design pressure. solved: finite elements at their last pressure; reduced_at_solve, strains: the
-    reduced model re-evaluated there. nearest: (pressure in MPa, Errors) of the step nearest to the
-    target. notes: what a reader must know to read the numbers rightly.
+    reduced: at the design pressure. solved: finite elements at their last pressure; reduced_at_solve,
+    strains: the reduced model re-evaluated there. nearest: (pressure in MPa, Errors) of the step nearest to
+    the target. notes: what a reader must know to read the numbers rightly.
     """
 
     reduced: np.ndarray | None
@@ -47,14 +47,15 @@ class Comparison:
             difference = compare(run.centreline[1], reduced)
             if difference.hausdorff > 1e-3 * difference.reference_length:
                 notes.append(
-                    f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives for "
-                    "design.toml now: it was edited, or predicted by another model. The report shows the model's curve."
+                    f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives"
+                    " for design.toml now: it was edited, or predicted by another model. The report shows"
+                    " the model's curve."
                 )
         nearest = None
         if run.stale:
             notes.append(
-                "The finite element solution in this folder is of another body: its dimensions, materials or loads are not those "
-                "of design.toml. It is not shown; run pneunet solve again."
+                "The finite element solution in this folder is of another body: its dimensions, materials or"
+                " loads are not those of design.toml. It is not shown; run pneunet solve again."
             )
         if run.solve is not None:
             notes += _loading(run)
@@ -89,20 +90,25 @@ def _loading(run):
     """Sentences on what acted in the finite elements beside a growing pressure."""
     record, notes = run.solve.record, []
     if run.design.loads:
-        notes.append(f"Dead loads act in the finite elements, {run.design.loads.text()}; the reduced model knows none.")
+        notes.append(
+            f"Dead loads act in the finite elements, {run.design.loads.text()}; the reduced model knows none."
+        )
     if record.get("control", "pressure") != "pressure":
-        notes.append(f"The finite elements were walked by {record['control']}: their last pressure is not one that was asked for.")
+        notes.append(
+            f"The finite elements were walked by {record['control']}: their last pressure is not one that was"
+            " asked for."
+        )
     for point in record.get("limit_points", []):
         notes.append(
-            f"The pressure has a limit point ({point['kind']}) of {plain(point['pressure_kPa'])} kPa at a cavity volume of "
-            f"{point['volume_mm3']:.4g} mm3: a body on a pressure source jumps there."
+            f"The pressure has a limit point ({point['kind']}) of {plain(point['pressure_kPa'])} kPa at a"
+            f" cavity volume of {point['volume_mm3']:.4g} mm3: a body on a pressure source jumps there."
         )
     return notes
 
 
 def smooth(s, points, spacing=1.0):
-    """Points (m, 3) about `spacing` mm apart on the cubic spline through section origins (n, 3) at s (n,) mm: the
-    stations of the finite element solution lie a pitch apart, and their chords cut corners."""
+    """Points (m, 3) about `spacing` mm apart on the cubic spline through section origins (n, 3) at s (n,) mm:
+    the stations of the finite element solution lie a pitch apart, and their chords cut corners."""
     fine = np.linspace(s[0], s[-1], int(np.ceil((s[-1] - s[0]) / spacing)) + 1)
     return CubicSpline(s, points)(fine)
 
@@ -133,20 +139,23 @@ def _errors(curve, reference):
 
 
 def overlaps(run):
-    """Sentences on what overlaps in the finite element solution: walls, parts of the body; [] when nothing does."""
+    """Sentences on what overlaps in the finite element solution: walls, parts of the body; [] when nothing
+    does."""
     solve, told = run.solve, []
     if solve is None:
         return told
     if solve.walls_overlap:
         depth = max([0.0] + [-distance for *_, distance in solve.walls])
         now = f", by up to {depth:.2f} mm at the end" if depth > 0 else ""
-        told.append(f"Walls overlap {_from(solve.record, 'first_touch')}{now}; contact is not part of this solution")
+        told.append(
+            f"Walls overlap {_from(solve.record, 'first_touch')}{now}; contact is not part of this solution"
+        )
     if solve.body_overlap:
         depth = -solve.steps["body_distance_mm"][-1]
         now = f", by up to {depth:.2f} mm at the end" if depth > 0 else ""
         told.append(
-            f"Parts of the body that are far apart along it overlap {_from(solve.record, 'first_body_touch')}{now}; their contact is "
-            "not modelled"
+            "Parts of the body that are far apart along it overlap"
+            f" {_from(solve.record, 'first_body_touch')}{now}; their contact is not modelled"
         )
     return told
 
@@ -156,11 +165,16 @@ def _from(record, name):
     pressure, dead = record.get(f"{name}_kPa"), record.get(f"{name}_dead_load_fraction")
     if pressure is None:
         return "at some load"
-    return f"from {pressure:.2f} kPa on" if pressure > 0 or not dead else f"from {100 * dead:.3g} % of the dead loads on"
+    return (
+        f"from {pressure:.2f} kPa on"
+        if pressure > 0 or not dead
+        else f"from {100 * dead:.3g} % of the dead loads on"
+    )
 
 
 def verdict(run, comparison):
-    """The result in one honest sentence, and what forbids to trust it: a solution in which walls overlap confirms nothing."""
+    """The result in one honest sentence, and what forbids to trust it: a solution in which walls overlap
+    confirms nothing."""
     c, design = comparison, run.design
     promise = ""
     if c.reduced_target:
@@ -168,18 +182,25 @@ def verdict(run, comparison):
         promise = f"for {at} the reduced model promises the target within {_mm(c.reduced_target)}"
     if c.solved is None:
         told = promise or "there is neither a target nor a finite element solution to judge the prediction by"
-        return f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet." if promise else f"{told[0].upper()}{told[1:]}."
+        return (
+            f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet."
+            if promise
+            else f"{told[0].upper()}{told[1:]}."
+        )
     pressure = f"{plain(run.solve.pressure * 1e3)} kPa"
     if c.reduced_solved is None:
         sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"
     else:
         percent = c.reduced_solved.percent(c.reduced_solved.rms)
-        word = "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
+        word = (
+            "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
+        )
         if overlaps(run):
             word = "is no test of"
         sentence = (
-            f"At {pressure} the finite element solution of the whole manipulator {word} the reduced prediction: "
-            f"they differ by {_mm(c.reduced_solved)}, and |k| of a segment by up to {_strain_difference(run, c):.0f} %"
+            f"At {pressure} the finite element solution of the whole manipulator {word} the reduced"
+            f" prediction: they differ by {_mm(c.reduced_solved)}, and |k| of a segment by up to"
+            f" {_strain_difference(run, c):.0f} %"
         )
     if promise:
         sentence += f"; {promise}; at {pressure} the finite element body misses it by {_mm(c.solved_target)}"
@@ -188,19 +209,35 @@ def verdict(run, comparison):
     if stopped_short(run):
         asked = run.solve.record.get("pressure_kPa", design.pressure * 1e3)
         walked = run.solve.record.get("control", "pressure") != "pressure"
-        reason = "ends below" if walked else "was asked for less than" if asked < design.pressure * 1e3 * (1 - 1e-6) else "stopped short of"
+        reason = (
+            "ends below"
+            if walked
+            else (
+                "was asked for less than"
+                if asked < design.pressure * 1e3 * (1 - 1e-6)
+                else "stopped short of"
+            )
+        )
         sentence += f"; it {reason} the design pressure, {plain(design.pressure * 1e3)} kPa"
     if c.nearest and c.nearest[0] < run.solve.pressure:
-        sentence += f". Its step nearest to the target is at {plain(c.nearest[0] * 1e3)} kPa, with {_mm(c.nearest[1])}"
+        sentence += (
+            f". Its step nearest to the target is at {plain(c.nearest[0] * 1e3)} kPa, with"
+            f" {_mm(c.nearest[1])}"
+        )
     if overlaps(run):
-        sentence = "NOT PROVEN. " + ". ".join([sentence, *overlaps(run), "The finite element shape is not what a real body would take"])
+        sentence = "NOT PROVEN. " + ". ".join(
+            [sentence, *overlaps(run), "The finite element shape is not what a real body would take"]
+        )
     return sentence + "."
 
 
 def _strain_difference(run, comparison):
-    """Largest |k_reduced - k_FE| over the segments, % of the largest |k| in FE: shows what positions do not."""
+    """Largest |k_reduced - k_FE| over the segments, % of the largest |k| in FE: shows what positions do
+    not."""
     solved = np.linalg.norm(run.solve.strains.k, axis=1)
-    return 100 * float(np.linalg.norm(comparison.strains.k - run.solve.strains.k, axis=1).max() / solved.max())
+    return 100 * float(
+        np.linalg.norm(comparison.strains.k - run.solve.strains.k, axis=1).max() / solved.max()
+    )
 
 
 def _mm(errors):

@@ -1,4 +1,5 @@
-"""Polylines: arc length, sampling at fractions of it, nearest points, curvature and torsion of sampled curves."""
+"""Polylines: arc length, sampling at fractions of it, nearest points, curvature and torsion of sampled
+curves."""
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -23,7 +24,8 @@ def evenly(points, count):
 
 
 def nearest_points(points, polyline):
-    """For every point (n, 3) the nearest point (n, 3) on the segments (not only the vertices) of a polyline (m, 3)."""
+    """For every point (n, 3) the nearest point (n, 3) on the segments (not only the vertices) of a polyline
+    (m, 3)."""
     points, polyline = np.asarray(points, float), np.asarray(polyline, float)
     start, step = polyline[:-1], np.diff(polyline, axis=0)
     squared = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
@@ -34,10 +36,12 @@ def nearest_points(points, polyline):
 
 
 def frenet(points, window):
-    """Curvature (m,) in 1/mm and torsion (m,) in rad/mm of a polyline, with the arc lengths (m,) where they hold.
+    """Curvature (m,) in 1/mm and torsion (m,) in rad/mm of a polyline, with the arc lengths (m,) where they
+    hold.
 
-    A quartic is fitted to every `window` mm of the evenly sampled curve (Savitzky & Golay 1964), which smooths noise
-    and blurs jumps over the same length. Torsion is 0 where the curve is too straight to have one.
+    A quartic is fitted to every `window` mm of the evenly sampled curve (Savitzky & Golay 1964), which
+    smooths noise and blurs jumps over the same length. Torsion is 0 where the curve is too straight to have
+    one.
     """
     length = arc_lengths(points)[-1]
     count = 401

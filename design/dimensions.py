@@ -1,4 +1,5 @@
-"""Drawing at a fixed scale with dimension lines: distances of lines and text are inches on paper, the part is in mm."""
+"""Drawing at a fixed scale with dimension lines: distances of lines and text are inches on paper, the part is
+in mm."""
 
 import numpy as np
 
@@ -27,7 +28,8 @@ def spread(positions, distance):
 
 
 class SheetView:
-    """A rectangle (left, bottom, width, height, inches) of a figure that shows (x, y) in mm at `scale` inches per mm.
+    """A rectangle (left, bottom, width, height, inches) of a figure that shows (x, y) in mm at `scale` inches
+    per mm.
 
     (x, y) lies at the rectangle's middle, moved by `right` and `up` inches.
     """
@@ -36,7 +38,9 @@ class SheetView:
         left, bottom, width, height = rectangle
         sheet_width, sheet_height = figure.get_size_inches()
         self.scale = scale
-        self.ax = figure.add_axes([left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height])
+        self.ax = figure.add_axes(
+            [left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height]
+        )
         x, y = x - right / scale, y - up / scale
         self.x0, self.x1 = x - width / 2 / scale, x + width / 2 / scale
         self.y0, self.y1 = y - height / 2 / scale, y + height / 2 / scale
@@ -78,7 +82,8 @@ class SheetView:
         )
 
     def cut(self, solids, voids, colour, clip=None):
-        """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); broken off at the x of `clip`."""
+        """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); broken off at the x of
+        `clip`."""
         from matplotlib.patches import Rectangle
 
         def add(box, **style):
@@ -190,7 +195,8 @@ class SheetView:
             self.text(level, y - self.mm(0.1), text, va="top", rotation=90, size=7)
 
     def angle(self, corner, degrees, radius):
-        """The angle of a line through `corner` with the x axis: the line, an arc of `radius` inches and the value."""
+        """The angle of a line through `corner` with the x axis: the line, an arc of `radius` inches and the
+        value."""
         from matplotlib.patches import Arc
 
         corner, r = np.asarray(corner, float), self.mm(radius)

@@ -1,4 +1,5 @@
-"""The dimensioned drawing of a manipulator: plan, side view, sections with every dimension in mm, table of segments."""
+"""The dimensioned drawing of a manipulator: plan, side view, sections with every dimension in mm, table of
+segments."""
 
 from base.files import atomic_path
 from design.dimensions import SheetView
@@ -15,13 +16,17 @@ INK = "#1b1f24"
 
 
 def segment_table(manipulator):
-    """Rows (label, [text for every segment]) of all dimensions, lengths in mm, for the drawing and the report."""
+    """Rows (label, [text for every segment]) of all dimensions, lengths in mm, for the drawing and the
+    report."""
 
     def row(label, value):
         return label, [value(s) for s in manipulator.segments]
 
     layers = [
-        row("stiff layer, bottom of the base", lambda s: plain(s.layer_thickness) if s.layer_thickness else "-"),
+        row(
+            "stiff layer, bottom of the base",
+            lambda s: plain(s.layer_thickness) if s.layer_thickness else "-",
+        ),
         row("its material", lambda s: s.layer_material.name if s.layer_thickness else "-"),
     ]
     return [
@@ -55,7 +60,8 @@ def segment_table(manipulator):
 
 
 def chamber_plan(segment, x, thickness, half_width, side):
-    """Plan corners (4, 2) in mm of a chamber or cavity centred at x; side -1 is the set turned half a turn about x."""
+    """Plan corners (4, 2) in mm of a chamber or cavity centred at x; side -1 is the set turned half a turn
+    about x."""
     half, slant = thickness / segment.sin / 2, segment.cot * half_width * side
     return [
         (x - slant - half, -half_width),
@@ -81,7 +87,14 @@ def drawing_figure(design):
     rows = segment_table(manipulator)
     scale = min((SHEET_WIDTH - 2 * MARGIN - 1.7) / manipulator.length, 0.16)
     plan_height = scale * max(s.width for s in manipulator.segments) + 1.9
-    side_height = scale * (max(s.chamber_top for s in manipulator.segments) - min(s.chamber_bottom for s in manipulator.segments)) + 1.7
+    side_height = (
+        scale
+        * (
+            max(s.chamber_top for s in manipulator.segments)
+            - min(s.chamber_bottom for s in manipulator.segments)
+        )
+        + 1.7
+    )
     panel_rows = -(-(2 * len(groups) + 2) // COLUMNS)
     height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
     figure = Figure(figsize=(SHEET_WIDTH, height), facecolor="white")
@@ -90,13 +103,29 @@ def drawing_figure(design):
     top = height - MARGIN - 0.75
     width = SHEET_WIDTH - 2 * MARGIN
     _plan(
-        SheetView(figure, (MARGIN, top - plan_height, width, plan_height), scale, manipulator.length / 2, 0.0, up=-0.4),
+        SheetView(
+            figure,
+            (MARGIN, top - plan_height, width, plan_height),
+            scale,
+            manipulator.length / 2,
+            0.0,
+            up=-0.4,
+        ),
         manipulator,
     )
     top -= plan_height
-    middle = (max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)) / 2
+    middle = (
+        max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)
+    ) / 2
     _side(
-        SheetView(figure, (MARGIN, top - side_height, width, side_height), scale, manipulator.length / 2, middle, up=0.48),
+        SheetView(
+            figure,
+            (MARGIN, top - side_height, width, side_height),
+            scale,
+            manipulator.length / 2,
+            middle,
+            up=0.48,
+        ),
         manipulator,
     )
     top -= side_height
@@ -116,23 +145,27 @@ def drawing_figure(design):
 def _frame(figure, design, height):
     from matplotlib.patches import Rectangle
 
-    figure.add_artist(Rectangle((0.012, 0.2 / height), 0.976, 1 - 0.4 / height, fill=False, edgecolor=INK, linewidth=1.2))
+    figure.add_artist(
+        Rectangle((0.012, 0.2 / height), 0.976, 1 - 0.4 / height, fill=False, edgecolor=INK, linewidth=1.2)
+    )
     manipulator = design.manipulator
     x, y = MARGIN / SHEET_WIDTH, 1 - (MARGIN + 0.1) / height
     figure.text(x, y, design.name, fontsize=17, weight="bold", color=INK, va="top")
     facts = (
-        f"pneu-net soft manipulator, {len(manipulator.segments)} segment{'s' * (len(manipulator.segments) > 1)}, "
-        f"{manipulator.chambers} chambers/pairs, total length {plain(manipulator.length)} mm, "
-        f"design pressure {plain(design.pressure * 1e3)} kPa"
+        f"pneu-net soft manipulator, {len(manipulator.segments)}"
+        f" segment{'s' * (len(manipulator.segments) > 1)}, {manipulator.chambers} chambers/pairs, total"
+        f" length {plain(manipulator.length)} mm, design pressure {plain(design.pressure * 1e3)} kPa"
     )
     figure.text(x, y - 0.33 / height, facts, fontsize=10, color=INK, va="top")
     figure.text(1 - x, y, "all dimensions in mm", fontsize=10, color=INK, va="top", ha="right")
     materials = {m.name: m for m in manipulator.materials}.values()
-    told = "; ".join(f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials)
+    told = "; ".join(
+        f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials
+    )
     notes = (
-        f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The lower '
-        "chambers of a twisting segment are the upper ones turned by half a turn about x. One cavity: the channel "
-        "joins all chambers."
+        f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The'
+        " lower chambers of a twisting segment are the upper ones turned by half a turn about x. One cavity:"
+        " the channel joins all chambers."
     )
     figure.text(x, (MARGIN + 0.42) / height, notes, fontsize=8.5, color=INK, va="top", linespacing=1.4)
 
@@ -146,7 +179,10 @@ def _plan(view, manipulator):
     view.title(-view.mm(0.28), view.mm(0.3), "plan")
     for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
         half = s.width / 2
-        view.polygon([(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)], face="#f1f3f5")
+        view.polygon(
+            [(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)],
+            face="#f1f3f5",
+        )
         for side in reversed(s.sides):
             for x in start + s.chamber_positions:
                 outline = chamber_plan(s, x, s.chamber_thickness, half, side)
@@ -162,7 +198,9 @@ def _plan(view, manipulator):
         first = start + s.chamber_positions[0]
         view.angle((first + half * s.cot, half), s.angle, 0.42)
         level = highest + view.mm(0.92 + (0.3 if short and i % 2 else 0.0))
-        view.balloon(start + s.length / 2, level, i + 1, f"{segment_mode(s)} {plain(s.angle)}°", segment_colour(i))
+        view.balloon(
+            start + s.length / 2, level, i + 1, f"{segment_mode(s)} {plain(s.angle)}°", segment_colour(i)
+        )
         if s.chambers > 1:
             x = first - half * s.cot
             view.horizontal(x, x + s.pitch, -half, -half - view.mm(0.3), f"pitch {plain(s.pitch)}")
@@ -217,7 +255,9 @@ def _side(view, manipulator):
     for start, stop, text, (a, b, active) in lengths:
         view.between(a, b, low - view.mm(0.25), active)
         view.horizontal(start, stop, low, low - view.mm(0.68), text)
-    view.horizontal(0.0, manipulator.length, low, low - view.mm(0.98), f"total length {plain(manipulator.length)}")
+    view.horizontal(
+        0.0, manipulator.length, low, low - view.mm(0.98), f"total length {plain(manipulator.length)}"
+    )
     view.text(-view.mm(0.1), low - view.mm(0.25), "passive | active", ha="right", size=6.5)
     view.text(-view.mm(0.1), low - view.mm(0.68), "segment", ha="right", size=6.5)
 
@@ -235,7 +275,9 @@ def _table(figure, rectangle, rows):
     view.text(0.06, y + step / 2, "segment", weight="bold", size=8, ha="left")
     for i in range(count):
         x = label_width + cell * i
-        view.polygon([(x, y), (x + cell, y), (x + cell, height), (x, height)], face=segment_colour(i), width=0)
+        view.polygon(
+            [(x, y), (x + cell, y), (x + cell, height), (x, height)], face=segment_colour(i), width=0
+        )
         view.text(x + cell / 2, y + step / 2, str(i + 1), weight="bold", size=8)
     size = min(8.0, 72 * step * 0.66)
     for number, (label, values) in enumerate(rows):

@@ -1,9 +1,9 @@
 """Extraction of twist, curvature, torsion and pitch from the pieces of a target (the paper's Fig. 8).
 
-Every kind of piece is an arc of uniform Frenet curvature and torsion: a straight line has neither, a circle no torsion.
-So one fit serves all: place the arc on the points by the best rigid fit, which has a closed form, and search the one or
-two rates that are left. The placed arc also has frames, bent towards -z as a one-sided segment bends, and the twist of
-a straight piece is the angle about it between the frames before and after.
+Every kind of piece is an arc of uniform Frenet curvature and torsion: a straight line has neither, a circle
+no torsion. So one fit serves all: place the arc on the points by the best rigid fit, which has a closed form,
+and search the one or two rates that are left. The placed arc also has frames, bent towards -z as a one-sided
+segment bends, and the twist of a straight piece is the angle about it between the frames before and after.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,8 @@ FIT_POINTS = 31
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc of uniform curvature (1/mm) and torsion (rad/mm) on points; frames (3, 3) at its ends; rms in mm."""
+    """An arc of uniform curvature (1/mm) and torsion (rad/mm) on points; frames (3, 3) at its ends; rms in
+    mm."""
 
     length: float
     curvature: float
@@ -34,10 +35,11 @@ class Arc:
 
 @dataclass(frozen=True)
 class Extracted:
-    """What one segment is to do, per deformed length: length mm, twist (tau or torsion) rad/mm, curvature 1/mm.
+    """What one segment is to do, per deformed length: length mm, twist (tau or torsion) rad/mm, curvature
+    1/mm.
 
-    twist_seen: the points (or frames) determine the twist. fit_rms: mm between the points and the piece of uniform
-    rates. note: what had to be assumed.
+    twist_seen: the points (or frames) determine the twist. fit_rms: mm between the points and the piece of
+    uniform rates. note: what had to be assumed.
     """
 
     kind: str
@@ -81,8 +83,8 @@ def _arc_points(s, curvature, twist):
 def fit_arc(points, kind, curvature=None, twist=None):
     """The `Arc` of a kind nearest to points (n, 3), paired by arc length, with given rates kept.
 
-    twisting: curvature 0; bending: torsion 0. The search starts from the median curvature and torsion of the points,
-    and, for a helix, from both hands.
+    twisting: curvature 0; bending: torsion 0. The search starts from the median curvature and torsion of the
+    points, and, for a helix, from both hands.
     """
     length = arc_lengths(points)[-1]
     s = np.linspace(0, length, FIT_POINTS)
@@ -107,7 +109,9 @@ def fit_arc(points, kind, curvature=None, twist=None):
         starts = [[length * np.median(curvatures)]]
     if given_twist is None:
         guess = np.median(torsions)
-        starts = [start + [length * t] for start in starts for t in ((guess, -guess, 0.0) if guess else (0.0,))]
+        starts = [
+            start + [length * t] for start in starts for t in ((guess, -guess, 0.0) if guess else (0.0,))
+        ]
     best = np.array(starts[0])
     if best.size:
         fits = [least_squares(misfit, start, xtol=1e-10, ftol=1e-12) for start in starts]
@@ -137,7 +141,10 @@ def extract(target, pieces):
         within = (own > low + 1e-6 * ends[-1]) & (own < high - 1e-6 * ends[-1])
         stations = np.concatenate([[low], own[within], [high]])
         arcs.append(fit_arc(sample(target.points, stations), piece.kind, piece.curvature, piece.twist))
-    out = [Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p)) for p, arc in zip(pieces, arcs)]
+    out = [
+        Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p))
+        for p, arc in zip(pieces, arcs)
+    ]
     for run in _runs(pieces):
         for i in run:
             if target.frames is not None:
@@ -165,7 +172,8 @@ def _runs(pieces):
 
 
 def _twist_of_run(target, pieces, arcs, run):
-    """`Extracted` for straight pieces in a row: only their sum shows, as a turn of the bending plane, modulo 2 pi."""
+    """`Extracted` for straight pieces in a row: only their sum shows, as a turn of the bending plane, modulo
+    2 pi."""
     first, last = run[0], run[-1]
     before = arcs[first - 1].end if first > 0 else target.base_rotation
     after = arcs[last + 1].start if last + 1 < len(pieces) else None
@@ -176,7 +184,10 @@ def _twist_of_run(target, pieces, arcs, run):
     if seen:
         shown = turn_about_axis(before, after)
         turn = (shown - given + np.pi) % (2 * np.pi) - np.pi
-        note = f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest is taken"
+        note = (
+            f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest"
+            " is taken"
+        )
         if len(free) > 1:
             note += "; shared evenly among neighbours"
     free_length = sum(pieces[i].length for i in free)

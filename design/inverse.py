@@ -1,7 +1,7 @@
 """Inverse design: the manipulator and the pressure whose predicted centreline lies on the target.
 
-Bounded least squares over angles, dimensions, numbers of chambers, the common pressure and the direction of the base:
-a first guess from the lookup table, then chambers counted as real numbers, then as whole ones.
+Bounded least squares over angles, dimensions, numbers of chambers, the common pressure and the direction of
+the base: a first guess from the lookup table, then chambers counted as real numbers, then as whole ones.
 """
 
 from dataclasses import dataclass, replace
@@ -21,16 +21,19 @@ from reduced.clearance import gap_left
 
 LEAST_PRESSURE = 0.002  # MPa
 INSET = 0.05  # of a variable's range: starts keep off the bounds, where the interior method crawls
-CONFIRMED = 1.05  # cost over that of the next start from there, which leaves the bounds, at which an optimum is one
+#: cost over that of the next start from there, which leaves the bounds, at which an optimum is one
+CONFIRMED = 1.05
 SPLIT_KEPT = 0.3  # a segment's number of chambers stays within this fraction of what its piece asks for
-GOOD_ENOUGH = 1.05  # cost of whole chambers over that of real-valued ones at which the search for others stops
+#: cost of whole chambers over that of real-valued ones at which the search for others stops
+GOOD_ENOUGH = 1.05
 FINE_ENOUGH = 1e-3  # objective over the curve's length at which it stops as well
 ROUNDING = {"angle": 2}  # decimals; mm and everything else to 3
 
 
 @dataclass(frozen=True)
 class Solution:
-    """base_pose (4, 4) in target coordinates; pressure in MPa; cost in mm^2; active: bounds the optimum sits on."""
+    """base_pose (4, 4) in target coordinates; pressure in MPa; cost in mm^2; active: bounds the optimum sits
+    on."""
 
     manipulator: Manipulator
     pressure: float
@@ -51,8 +54,13 @@ def solve(target, pieces, law, objective=PAIRED, say=print):
     prototypes = [prototype(target, piece) for piece in pieces]
     guesses = _guesses(target, pieces, prototypes, law)
     if not guesses:
-        raise ConvergenceError("the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker")
-    say(f"lookup table: first guess at {1e3 * guesses[0].pressure:.1f} kPa, angles " + _angles(guesses[0].segments))
+        raise ConvergenceError(
+            "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
+        )
+    say(
+        f"lookup table: first guess at {1e3 * guesses[0].pressure:.1f} kPa, angles "
+        + _angles(guesses[0].segments)
+    )
     run = _Run.start(target, pieces, law, guesses[0]).optimised(real_counts=True)
     if objective == EQ27:
         run = run.with_objective(EQ27).optimised(real_counts=True)
@@ -68,12 +76,16 @@ def _guesses(target, pieces, prototypes, law):
         least = 2 * segment.end_length + segment.chamber_thickness
         if piece.length < least:
             found = f"length_mm = {piece.length:.3g}"
-            raise InputError(f"[[piece]] {i + 1}: {found} is too short for one chamber and its ends ({least:.3g} mm)")
+            raise InputError(
+                f"[[piece]] {i + 1}: {found} is too short for one chamber and its ends ({least:.3g} mm)"
+            )
         varying = limits(target, piece, segment)
         angles.append(grid(varying.get("angle"), 90.0, 5.0))
         heights.append(grid(varying.get("chamber_height"), segment.chamber_height, 1.0))
     low, high = target.pressure_range or (0.010, PRESSURE_LIMIT)
-    pressures = np.linspace(low, high, max(1, round((high - low) / 0.010)) + 1) if high > low else np.array([low])
+    pressures = (
+        np.linspace(low, high, max(1, round((high - low) / 0.010)) + 1) if high > low else np.array([low])
+    )
     return first_guesses(pieces, prototypes, angles, heights, pressures, law)
 
 
@@ -98,11 +110,17 @@ class _Run:
         for i, (piece, segment) in enumerate(zip(pieces, guess.segments)):
             for name, ((low, high), (least, most)) in limits(target, piece, segment).items():
                 value = float(np.clip(getattr(segment, name), low, high))
-                start = None if name == "angle" else float(np.clip(getattr(prototype(target, piece), name), low, high))
+                start = (
+                    None
+                    if name == "angle"
+                    else float(np.clip(getattr(prototype(target, piece), name), low, high))
+                )
                 variables.append(Variable(name, i, value, low, high, least, most, start))
         if target.pressure_range is None:
             low, high = max(LEAST_PRESSURE, 0.6 * guess.pressure), min(PRESSURE_LIMIT, 1.4 * guess.pressure)
-            variables.append(Variable("pressure", None, guess.pressure, low, high, LEAST_PRESSURE, PRESSURE_LIMIT))
+            variables.append(
+                Variable("pressure", None, guess.pressure, low, high, LEAST_PRESSURE, PRESSURE_LIMIT)
+            )
         elif target.pressure_range[1] > target.pressure_range[0]:
             low, high = target.pressure_range
             variables.append(Variable("pressure", None, guess.pressure, low, high, low, high))
@@ -126,19 +144,24 @@ class _Run:
 
     def allows(self, counts):
         """Whether numbers of chambers lie in their ranges, rounded outwards."""
-        ranges = {v.segment: (np.floor(v.low), np.ceil(v.high)) for v in self.variables if v.name == "chambers"}
+        ranges = {
+            v.segment: (np.floor(v.low), np.ceil(v.high)) for v in self.variables if v.name == "chambers"
+        }
         return all(ranges[i][0] <= n <= ranges[i][1] for i, n in enumerate(counts))
 
     def with_objective(self, objective):
         return replace(self, problem=replace(self.problem, objective=objective))
 
     def with_counts(self, counts):
-        variables = tuple(replace(v, value=float(counts[v.segment])) if v.name == "chambers" else v for v in self.variables)
+        variables = tuple(
+            replace(v, value=float(counts[v.segment])) if v.name == "chambers" else v for v in self.variables
+        )
         problem = replace(self.problem, counts=tuple(float(n) for n in counts))
         return replace(self, problem=problem, variables=variables, cost=np.inf)
 
     def turned_to_target(self):
-        """The base turned about its free axes to bring the present curve nearest to the target, in closed form."""
+        """The base turned about its free axes to bring the present curve nearest to the target, in closed
+        form."""
         problem, free = self.problem, self.problem.turns.shape[1]
         trial = Trial(problem, self.variables, self._x(self.variables))
         points = evenly(trial.centreline(problem.law, np.zeros(3)).points, PAIRS) @ problem.rotation
@@ -146,7 +169,9 @@ class _Run:
         moment = points.T @ wanted
         turn = np.eye(3)
         if free == 1:
-            turn = se3.exp_rotation(np.array([np.arctan2(moment[1, 2] - moment[2, 1], moment[1, 1] + moment[2, 2]), 0, 0]))
+            turn = se3.exp_rotation(
+                np.array([np.arctan2(moment[1, 2] - moment[2, 1], moment[1, 1] + moment[2, 2]), 0, 0])
+            )
         elif free == 3:
             U, _, Vt = np.linalg.svd(moment)
             turn = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
@@ -156,7 +181,8 @@ class _Run:
         return np.array([v.value for v in variables] + [0.0] * self.problem.turns.shape[1])
 
     def optimised(self, real_counts):
-        """The local optimum; ranges grow while it sits on a bound that may, and a new start has to confirm it."""
+        """The local optimum; ranges grow while it sits on a bound that may, and a new start has to confirm
+        it."""
         run = self
         while True:
             before, run = run.cost, run.optimised_once(real_counts)
@@ -178,7 +204,9 @@ class _Run:
         starts = [np.clip(self._x(variables), low + d, high - d) for d in (inset, 0 * inset)]
         start = next((x for x in starts if calls.attempt(x) is not None), None)
         if start is None:
-            raise ConvergenceError(f"the law has no equilibrium at {1e3 * problem.pressure:.1f} kPa: lower the pressure")
+            raise ConvergenceError(
+                f"the law has no equilibrium at {1e3 * problem.pressure:.1f} kPa: lower the pressure"
+            )
         options = {"x_scale": scale, "xtol": 1e-5, "ftol": 3e-3, "gtol": 1e-10, "max_nfev": 40}
         fit = least_squares(calls.residual, start, calls.jacobian, (low, high), **options)
         trial = Trial(problem, variables, fit.x)
@@ -191,14 +219,21 @@ class _Run:
             pressure=trial.pressure,
             rotation=trial.rotation,
         )
-        return replace(self, problem=problem, variables=values, cost=2 * fit.cost, evaluations=self.evaluations + calls.count)
+        return replace(
+            self,
+            problem=problem,
+            variables=values,
+            cost=2 * fit.cost,
+            evaluations=self.evaluations + calls.count,
+        )
 
     @property
     def title(self):
         counts = " / ".join(f"{n:.3g}" for n in self.problem.counts)
         return (
-            f"angles {_angles(self.problem.prototypes)} deg, chambers {counts}, {1e3 * self.problem.pressure:.1f} kPa, "
-            f"objective {np.sqrt(self.cost):.3f} mm (root mean square)"
+            f"angles {_angles(self.problem.prototypes)} deg, chambers {counts},"
+            f" {1e3 * self.problem.pressure:.1f} kPa, objective {np.sqrt(self.cost):.3f} mm (root mean"
+            " square)"
         )
 
     def solution(self):
@@ -211,7 +246,9 @@ class _Run:
         pressure = round(self.problem.pressure, 6)
         rounded = replace(self.problem, prototypes=tuple(segments), pressure=pressure)
         residual = rounded.residual(Trial(rounded, (), np.zeros(self.problem.turns.shape[1])))
-        active = tuple(v.text for v in self.variables if v.bound is not None) + tuple(about_to_touch(segments, pressure))
+        active = tuple(v.text for v in self.variables if v.bound is not None) + tuple(
+            about_to_touch(segments, pressure)
+        )
         pose = se3.make_pose(self.problem.rotation, self.problem.target.points[0])
         return Solution(
             Manipulator(tuple(segments)),
@@ -229,11 +266,15 @@ def about_to_touch(segments, pressure):
     for i, segment in enumerate(segments, start=1):
         left = gap_left(segment, pressure)
         if left < 0.02 * segment.gap:
-            yield f"segment {i} clearance of facing walls (estimate: {max(left, 0.0):.2f} mm left of {segment.gap:.2f} mm)"
+            yield (
+                f"segment {i} clearance of facing walls (estimate: {max(left, 0.0):.2f} mm left of"
+                f" {segment.gap:.2f} mm)"
+            )
 
 
 def _whole_chambers(run):
-    """Whole numbers of chambers: from the nearest ones, one chamber more or less at a time while that helps."""
+    """Whole numbers of chambers: from the nearest ones, one chamber more or less at a time while that
+    helps."""
     tried = {}
 
     def attempt(counts):

@@ -25,7 +25,8 @@ def plain(value, decimals=2):
 
 
 def significant(value, digits=4):
-    """A number of `digits` significant digits, never with an exponent: 193812.3 -> '193800', 0.01234 -> '0.01234'."""
+    """A number of `digits` significant digits, never with an exponent: 193812.3 -> '193800', 0.01234 ->
+    '0.01234'."""
     if value == 0:
         return "0"
     decimals = digits - 1 - math.floor(math.log10(abs(value)))

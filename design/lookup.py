@@ -1,7 +1,8 @@
-"""Lookup table for the first guess (the paper's Fig. 8f): what each kind of segment does over angle, height, pressure.
+"""Lookup table for the first guess (the paper's Fig. 8f): what each kind of segment does over angle, height,
+pressure.
 
-All segments share one pressure, so the table is read pressure by pressure: at each, every piece takes the angle and
-chamber height whose deformed active length turns most nearly as the piece asks, in rad.
+All segments share one pressure, so the table is read pressure by pressure: at each, every piece takes the
+angle and chamber height whose deformed active length turns most nearly as the piece asks, in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +17,8 @@ OUTSIDE = 1.0  # rad per width of what the law knows that an entry lies outside 
 
 @dataclass(frozen=True)
 class Guess:
-    """One entry read from the table for every piece: `segments` (chambers 1), real-valued `counts`, pressure in MPa."""
+    """One entry read from the table for every piece: `segments` (chambers 1), real-valued `counts`, pressure
+    in MPa."""
 
     pressure: float
     segments: tuple
@@ -31,23 +33,29 @@ def responses(strains, twisting):
 
 
 def count_for(segment, stretch, deformed_length):
-    """Real number of chambers (>= 1) that makes a segment as long as asked when its active part is stretched."""
+    """Real number of chambers (>= 1) that makes a segment as long as asked when its active part is
+    stretched."""
     return max(1.0, (deformed_length - 2 * segment.end_wall) / stretch / segment.pitch)
 
 
 def first_guesses(pieces, prototypes, angles, heights, pressures, law):
     """`Guess`es, best first, one for every pressure at which each piece has an entry.
 
-    pieces: `Extracted`; prototypes: a Segment for each with its start dimensions; angles (deg) and heights (mm): the
-    grid of each piece; pressures: increasing, MPa.
+    pieces: `Extracted`; prototypes: a Segment for each with its start dimensions; angles (deg) and heights
+    (mm): the grid of each piece; pressures: increasing, MPa.
     """
-    options = [_options(piece, prototype, a, h, pressures, law) for piece, prototype, a, h in zip(pieces, prototypes, angles, heights)]
+    options = [
+        _options(piece, prototype, a, h, pressures, law)
+        for piece, prototype, a, h in zip(pieces, prototypes, angles, heights)
+    ]
     guesses = []
     for j, pressure in enumerate(pressures):
         best = [min(entries[j], key=lambda entry: entry[0], default=None) for entries in options]
         if None not in best:
             misfit = sum(entry[0] for entry in best)
-            guesses.append(Guess(float(pressure), tuple(b[1] for b in best), tuple(b[2] for b in best), misfit))
+            guesses.append(
+                Guess(float(pressure), tuple(b[1] for b in best), tuple(b[2] for b in best), misfit)
+            )
     return sorted(guesses, key=lambda guess: guess.misfit)
 
 

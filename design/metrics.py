@@ -13,8 +13,8 @@ PAIRS = 201
 class Errors:
     """Distances of a curve from a reference curve: mm, and mm^2 for `eq27`.
 
-    rms: root mean square distance of points paired at equal fractions of each curve's own arc length.
-    eq27: the paper's Eq. 27, the *sum* over the reference's points of the squared distance to the curve (the paper
+    rms: root mean square distance of points paired at equal fractions of each curve's own arc length. eq27:
+    the paper's Eq. 27, the *sum* over the reference's points of the squared distance to the curve (the paper
         calls it a mean squared error; a curve that is too long does not raise it).
     hausdorff: largest distance from either curve to the other.  tip: distance of the last points.
     """
@@ -60,13 +60,16 @@ class Errors:
             f"Eq. 27, sum over {self.eq27_points:4d} points {self.eq27:8.3f} mm^2",
             f"Hausdorff, two-sided       {self.hausdorff:8.3f} mm   ({self.percent(self.hausdorff):.2f} %)",
             f"tip                        {self.tip:8.3f} mm   ({self.percent(self.tip):.2f} %)",
-            f"length {self.length:.2f} mm, wanted {self.reference_length:.2f} mm: {self.length_mismatch:+.2f} mm "
-            f"({self.percent(self.length_mismatch):+.2f} %)",
+            (
+                f"length {self.length:.2f} mm, wanted {self.reference_length:.2f} mm:"
+                f" {self.length_mismatch:+.2f} mm ({self.percent(self.length_mismatch):+.2f} %)"
+            ),
         ]
 
 
 def paired_rms(a, b, pairs=PAIRS):
-    """RMS distance in mm of polylines a (n, 3) and b (m, 3) paired at equal fractions of their own arc lengths."""
+    """RMS distance in mm of polylines a (n, 3) and b (m, 3) paired at equal fractions of their own arc
+    lengths."""
     return float(np.sqrt(np.mean(np.sum((evenly(a, pairs) - evenly(b, pairs)) ** 2, axis=1))))
 
 
@@ -76,13 +79,15 @@ def eq27(points, curve):
 
 
 def hausdorff(a, b):
-    """Two-sided Hausdorff distance in mm of polylines, from the vertices of each to the segments of the other."""
+    """Two-sided Hausdorff distance in mm of polylines, from the vertices of each to the segments of the
+    other."""
     one_way = [np.linalg.norm(p - nearest_points(p, q), axis=1).max() for p, q in ((a, b), (b, a))]
     return float(max(one_way))
 
 
 def compare(curve, reference):
-    """`Errors` of a polyline (m, 3) against a reference polyline (n, 3), both in mm and in the same coordinates.
+    """`Errors` of a polyline (m, 3) against a reference polyline (n, 3), both in mm and in the same
+    coordinates.
 
     The reference is the target, or the finite element solution when a reduced prediction is judged.
     """

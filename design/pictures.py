@@ -1,4 +1,5 @@
-"""Pictures of centrelines in matplotlib: 3D with equal scale, two projections, and the picture of a design."""
+"""Pictures of centrelines in matplotlib: 3D with equal scale, two projections, and the picture of a
+design."""
 
 import numpy as np
 
@@ -27,10 +28,13 @@ def equal_axes_3d(ax, points, pad=0.06):
 def curve_panels(figure, curves, segments=None, bottom=0.06):
     """3D view and the x-y and x-z projections of curves.
 
-    curves : [(label, points (n, 3) in mm, style of STYLES)]. segments : [(colour, points)], bands under the curves.
+    curves : [(label, points (n, 3) in mm, style of STYLES)]. segments : [(colour, points)], bands under the
+    curves.
     """
     everything = np.vstack([points for _, points, _ in curves])
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32)
+    grid = figure.add_gridspec(
+        2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32
+    )
     ax = figure.add_subplot(grid[:, 0], projection="3d")
     ax.view_init(*camera_angles(everything))
     band = {"linewidth": 9, "alpha": 0.75, "solid_capstyle": "butt", "zorder": 1}
@@ -62,7 +66,9 @@ def segment_bands(manipulator, s, points):
     bands = []
     for i, (start, end) in enumerate(zip(manipulator.starts, ends)):
         inside = np.concatenate([[start], s[(s > start) & (s < end)], [end]])
-        bands.append((segment_colour(i), np.column_stack([np.interp(inside, s, column) for column in points.T])))
+        bands.append(
+            (segment_colour(i), np.column_stack([np.interp(inside, s, column) for column in points.T]))
+        )
     return bands
 
 
@@ -104,7 +110,8 @@ def error_caption(errors):
 
 
 def draw_design(directory):
-    """Write design.png of a run directory: target against the reduced prediction, errors, segments, pressure."""
+    """Write design.png of a run directory: target against the reduced prediction, errors, segments,
+    pressure."""
     from design.metrics import compare
 
     run = read_run(directory)

@@ -1,7 +1,8 @@
 """The least-squares problem: what a vector of variables stands for, and how far its curve is from the target.
 
-The default objective pairs points at equal fractions of arc length. It bounds the paper's Eq. 27 from above, since a
-nearest point is no farther than the paired one, and unlike Eq. 27 it is not lowered by a manipulator that is too long.
+The default objective pairs points at equal fractions of arc length. It bounds the paper's Eq. 27 from above,
+since a nearest point is no farther than the paired one, and unlike Eq. 27 it is not lowered by a manipulator
+that is too long.
 """
 
 from dataclasses import dataclass, replace
@@ -20,13 +21,16 @@ OBJECTIVES = (PAIRED, EQ27)
 PAIRS = 101
 SPACING = 2.0  # mm between the samples of a trial's centreline
 STEP = 1e-5  # of a variable's range, for differences
-TOUCH = 5.0  # mm of misfit per mm that facing walls would overlap: contact is not in the law, so it is not designed into
+#: mm of misfit per mm that facing walls would overlap: contact is not in the law, so it is not designed into
+TOUCH = 5.0
 OUTSIDE = 20.0  # mm of misfit per width of what the law knows that a segment lies outside of it
-PREFERENCE = 0.02  # mm of misfit per range that a dimension leaves its start by: decides where the target does not
+#: mm of misfit per range that a dimension leaves its start by: decides where the target does not
+PREFERENCE = 0.02
 
 
 class Trial:
-    """What a vector of variables stands for: segments, real counts of chambers, pressure and base rotation."""
+    """What a vector of variables stands for: segments, real counts of chambers, pressure and base
+    rotation."""
 
     def __init__(self, problem, variables, x):
         changes = [{} for _ in problem.prototypes]
@@ -50,10 +54,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class Problem:
-    """The problem around a state: prototypes (chambers 1), real counts, pressure, base rotation and its freedom.
+    """The problem around a state: prototypes (chambers 1), real counts, pressure, base rotation and its
+    freedom.
 
-    turns (3, m): the columns are the axes, in base axes, about which the base may turn: 3 when it is free, 1 when its
-    direction is fixed, none when it is fixed altogether.
+    turns (3, m): the columns are the axes, in base axes, about which the base may turn: 3 when it is free, 1
+    when its direction is fixed, none when it is fixed altogether.
     """
 
     target: object
@@ -71,7 +76,9 @@ class Problem:
         target = self.target
         line = trial.centreline(self.law, target.points[0])
         if self.objective == EQ27:
-            misfits = [(nearest_points(target.points, line.points) - target.points) / np.sqrt(len(target.points))]
+            misfits = [
+                (nearest_points(target.points, line.points) - target.points) / np.sqrt(len(target.points))
+            ]
         else:
             misfits = [self._paired(line)]
         misfits += [self._unseen_twists(trial), TOUCH * walls_overlap(trial.segments, trial.pressure)]
@@ -79,7 +86,8 @@ class Problem:
         return np.concatenate([m.ravel() for m in misfits])
 
     def _paired(self, line):
-        """Points at equal fractions of arc length; with frames also the body's edges, half a width off the line."""
+        """Points at equal fractions of arc length; with frames also the body's edges, half a width off the
+        line."""
         target = self.target
         own = line.arc_length
         frames = line.at(np.interp(np.linspace(0, own[-1], PAIRS), own, line.s))
@@ -102,12 +110,14 @@ class Problem:
 
 
 def walls_overlap(segments, pressure):
-    """By how much (mm) facing walls of each segment are expected to pass through each other; 0 where a gap stays."""
+    """By how much (mm) facing walls of each segment are expected to pass through each other; 0 where a gap
+    stays."""
     return np.array([max(0.0, -gap_left(s, pressure)) for s in segments])
 
 
 class Calls:
-    """Residual and its differences for least_squares, counted; where the law has no equilibrium no step is taken."""
+    """Residual and its differences for least_squares, counted; where the law has no equilibrium no step is
+    taken."""
 
     def __init__(self, problem, variables, scale, high):
         self.problem, self.variables, self.scale, self.high = problem, variables, scale, high

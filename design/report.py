@@ -55,8 +55,8 @@ footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
 def write_report(directory, say=print, law=None):
     """Write directory/report.html and its pictures in directory/report/; returns the path of the page.
 
-    law: a SegmentLaw, by default the one that the folder was designed with. Shows what is there: without a mesh or a finite
-    element solution it says so. InputError without design.toml.
+    law: a SegmentLaw, by default the one that the folder was designed with. Shows what is there: without a
+    mesh or a finite element solution it says so. InputError without design.toml.
     """
     run = read_run(directory)
     law = choose_law(run.law) if law is None else law
@@ -72,7 +72,9 @@ def write_report(directory, say=print, law=None):
         ("Drawing, dimensions, material", _drawing(run, folder)),
         ("How it was computed", _computed(run)),
     ]
-    body = _headline(run, comparison) + "".join(f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections)
+    body = _headline(run, comparison) + "".join(
+        f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections
+    )
     page = (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -90,7 +92,10 @@ def write_report(directory, say=print, law=None):
 def _image(folder, name, caption):
     data = base64.b64encode((Path(folder) / name).read_bytes()).decode()
     told = escape(caption)
-    return f'<figure><img alt="{told}" src="data:image/png;base64,{data}"><figcaption>{told}</figcaption></figure>'
+    return (
+        f'<figure><img alt="{told}"'
+        f' src="data:image/png;base64,{data}"><figcaption>{told}</figcaption></figure>'
+    )
 
 
 def _grid(folder, pictures):
@@ -105,7 +110,13 @@ def _table(header, rows):
         if isinstance(row, str):
             out += f'<tr class="head"><td colspan="{len(header)}">{escape(row)}</td></tr>'
         else:
-            out += "<tr>" + "".join(f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row) + "</tr>"
+            out += (
+                "<tr>"
+                + "".join(
+                    f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row
+                )
+                + "</tr>"
+            )
     return f'<div class="table"><table>{out}</table></div>'
 
 
@@ -126,7 +137,10 @@ def _headline(run, comparison):
         f"{len(m.segments)} segment{'s' * (len(m.segments) > 1)} ({names}), {m.length:.1f} mm long at rest, "
         f"{m.segments[0].width:g} mm wide, one pressure of {plain(design.pressure * 1e3)} kPa."
     )
-    out = f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b> {escape(designed)}</p>"
+    out = (
+        f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b>"
+        f" {escape(designed)}</p>"
+    )
     out += f'<p class="verdict">{escape(verdict(run, comparison))}</p>'
     out += _alarms(run)
     out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
@@ -180,16 +194,22 @@ def _errors(comparison, run):
         ["RMS, points paired by arc length"] + [both(e, e.rms) for _, e in columns],
         ["two-sided Hausdorff distance"] + [both(e, e.hausdorff) for _, e in columns],
         ["tip distance"] + [both(e, e.tip) for _, e in columns],
-        ["Eq. 27 (sum of squared nearest distances)"] + [f"{significant(e.eq27)} mm² over {e.eq27_points} points" for _, e in columns],
+        ["Eq. 27 (sum of squared nearest distances)"]
+        + [f"{significant(e.eq27)} mm² over {e.eq27_points} points" for _, e in columns],
         ["length mismatch"] + [both(e, e.length_mismatch, "+") for _, e in columns],
         ["lengths"] + [f"{e.length:.2f} mm vs {e.reference_length:.2f} mm" for _, e in columns],
     ]
-    return _table(["", *[name for name, _ in columns]], rows) + "<p>% of the length of the second curve named.</p>"
+    return (
+        _table(["", *[name for name, _ in columns]], rows)
+        + "<p>% of the length of the second curve named.</p>"
+    )
 
 
 def _strains(run, comparison):
     if run.solve is None:
-        return _missing("Segment strains are measured on the finite element solution, which is not there yet.")
+        return _missing(
+            "Segment strains are measured on the finite element solution, which is not there yet."
+        )
     measured, predicted = run.solve.strains, comparison.strains
     quantities = [
         ("stretch |e|", lambda s: s.stretch, 1.0, 4),
@@ -211,8 +231,8 @@ def _strains(run, comparison):
     return (
         _alarms(run)
         + _table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
-        + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not depend on "
-        "that choice.</p>"
+        + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not"
+        " depend on that choice.</p>"
     )
 
 
@@ -241,12 +261,14 @@ def _walls(run, folder):
     far = solve.steps["body_distance_mm"][-1]
     if np.isfinite(far):
         out += (
-            f"<p>Coils and segments: the smallest distance between parts that are far apart along the body is {far:.2f} mm. "
-            "Contact between such parts is not modelled.</p>"
+            "<p>Coils and segments: the smallest distance between parts that are far apart along the body is"
+            f" {far:.2f} mm. Contact between such parts is not modelled.</p>"
         )
     if not distances:
         return out + _missing("No wall distances: the body has no gaps.")
-    out += "".join(_image(folder, *p) for p in figures.touching_picture(run, folder) + figures.wall_picture(run, folder))
+    out += "".join(
+        _image(folder, *p) for p in figures.touching_picture(run, folder) + figures.wall_picture(run, folder)
+    )
     rows = []
     for key in sorted({(a, b) for a, b, _, _ in run.solve.walls}, key=lambda k: (k[0], -k[1])):
         here = [(d, gap) for a, b, gap, d in run.solve.walls if (a, b) == key]
@@ -262,12 +284,17 @@ def _walls(run, folder):
                 "open" if distance >= 0 else "in contact" if solve.contact else "OVERLAP",
             ]
         )
-    return out + _table(["segment, side", "gaps", "gap at rest, mm", "smallest distance, mm", "in gap", ""], rows)
+    return out + _table(
+        ["segment, side", "gaps", "gap at rest, mm", "smallest distance, mm", "in gap", ""], rows
+    )
 
 
 def _drawing(run, folder):
     rows = segment_table(run.design.manipulator)
-    table = _table(["segment", *[str(i + 1) for i in range(len(rows[0][1]))]], [[label, *values] for label, values in rows])
+    table = _table(
+        ["segment", *[str(i + 1) for i in range(len(rows[0][1]))]],
+        [[label, *values] for label, values in rows],
+    )
     materials = {m.name: m for m in run.design.manipulator.materials}.values()
     told = _table(
         ["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],

@@ -45,16 +45,18 @@ def curve_picture(run, comparison, folder):
     return [
         (
             "curves.png",
-            f"Centrelines in 3D and in two projections, equal scale; segments coloured along the {where}."
-            if bands
-            else "Centrelines in 3D and in two projections, equal scale.",
+            (
+                f"Centrelines in 3D and in two projections, equal scale; segments coloured along the {where}."
+                if bands
+                else "Centrelines in 3D and in two projections, equal scale."
+            ),
         )
     ]
 
 
 def body_pictures(run, comparison, law, folder):
-    """Target, reduced body, finite element body and the reference body from one camera at one scale; fields on the
-    finite element body."""
+    """Target, reduced body, finite element body and the reference body from one camera at one scale; fields
+    on the finite element body."""
     design = run.design
     pressure = run.solve.pressure if run.solve else design.pressure
     reduced = None
@@ -63,7 +65,9 @@ def body_pictures(run, comparison, law, folder):
     rest = bodies.body_mesh(design.manipulator, 0.0, law, design.base_pose)
     solved = None
     if run.solve is not None and run.solve.solution is not None:
-        solved, solved_edges = bodies.deformed_surface(bodies.read_solution(run.solve.solution), design.base_pose)
+        solved, solved_edges = bodies.deformed_surface(
+            bodies.read_solution(run.solve.solution), design.base_pose
+        )
     target = None if run.target is None else bodies.tube(run.target)
     curves = [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
     held = [m.points for m in (reduced, solved) if m is not None] + curves
@@ -81,7 +85,8 @@ def body_pictures(run, comparison, law, folder):
             "target.png",
             with_target,
             "target",
-            "The target curve (black in the other pictures of this row too, where the body does not hide it).",
+            "The target curve (black in the other pictures of this row too, where the body does not hide"
+            " it).",
         )
     if reduced is not None:
         picture(
@@ -107,7 +112,11 @@ def body_pictures(run, comparison, law, folder):
             values = solved.point_data[field]
             top = np.percentile(values, 99.5)
             limits = (float(values.min()), float(max(top, values.min() + 1e-9)))
-            beyond = f"; 0.5 % of its nodes lie above the scale, up to {values.max():.2f}" if values.max() > 1.01 * top else ""
+            beyond = (
+                f"; 0.5 % of its nodes lie above the scale, up to {values.max():.2f}"
+                if values.max() > 1.01 * top
+                else ""
+            )
             if field == "stretch":
                 beyond += f"; the largest inside the elements is {run.solve.steps['largest_stretch'][-1]:.2f}"
             picture(
@@ -118,7 +127,12 @@ def body_pictures(run, comparison, law, folder):
                 (label, limits, cmap),
             )
     rest_view = rendering.view_of(rest.points)
-    rendering.write_picture(folder / "reference.png", rest_view, rendering.render(rest_view, bodies.painted(rest)), "reference body, 0 kPa")
+    rendering.write_picture(
+        folder / "reference.png",
+        rest_view,
+        rendering.render(rest_view, bodies.painted(rest)),
+        "reference body, 0 kPa",
+    )
     out.append(("reference.png", "The body at rest (its own scale)."))
     return out
 
@@ -147,7 +161,9 @@ def history_picture(run, law, folder):
             label=f"{name}, finite elements",
         )
         if len(tips):
-            axes[0, 0].plot(tips[:, 0], tips[:, i + 1], "--", color=colour, linewidth=1.2, label=f"{name}, reduced")
+            axes[0, 0].plot(
+                tips[:, 0], tips[:, i + 1], "--", color=colour, linewidth=1.2, label=f"{name}, reduced"
+            )
     axes[0, 0].set_ylabel("tip, body axes (mm)")
     axes[0, 0].legend(fontsize=7, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
     for ax, column, label in (
@@ -160,7 +176,15 @@ def history_picture(run, law, folder):
         ax.set_ylabel(label)
     between = steps["body_distance_mm"]
     if between.min() < 2 * max(s.gap for s in design.manipulator.segments):
-        axes[1, 0].plot(p, between, "s--", color="#862e9c", markersize=3, linewidth=1.2, label="parts far apart along the body")
+        axes[1, 0].plot(
+            p,
+            between,
+            "s--",
+            color="#862e9c",
+            markersize=3,
+            linewidth=1.2,
+            label="parts far apart along the body",
+        )
         axes[1, 0].legend(fontsize=7, frameon=False)
     low = axes[1, 0].get_ylim()[0]
     axes[1, 0].axhline(0.0, color="#c92a2a", linewidth=1.0)
@@ -176,8 +200,10 @@ def history_picture(run, law, folder):
     return [
         (
             "history.png",
-            "Load history of the finite element solution, one mark an accepted step; the reduced model's tip dashed; "
-            "dotted: design pressure; red: below zero walls overlap.",
+            (
+                "Load history of the finite element solution, one mark an accepted step; the reduced model's"
+                " tip dashed; dotted: design pressure; red: below zero walls overlap."
+            ),
         )
     ]
 
@@ -186,7 +212,9 @@ def touching_picture(run, folder):
     """The deformed body, its facing walls coloured by their distance; [] without fields or gaps."""
     if run.solve.solution is None:
         return []
-    surface, (lines, _) = bodies.deformed_surface(bodies.read_solution(run.solve.solution), run.design.base_pose)
+    surface, (lines, _) = bodies.deformed_surface(
+        bodies.read_solution(run.solve.solution), run.design.base_pose
+    )
     walls = bodies.facing_walls(surface)
     if walls is None:
         return []
@@ -198,14 +226,17 @@ def touching_picture(run, folder):
     return [
         (
             "fe_walls.png",
-            "Finite element body, last step; walls that face each other across a gap coloured by their distance. A black line surrounds "
-            f"where one {around}.",
+            (
+                "Finite element body, last step; walls that face each other across a gap coloured by their"
+                f" distance. A black line surrounds where one {around}."
+            ),
         )
     ]
 
 
 def wall_picture(run, folder):
-    """Plan strips of the upper and the lower side, every gap coloured by the smallest distance of its walls."""
+    """Plan strips of the upper and the lower side, every gap coloured by the smallest distance of its
+    walls."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import TwoSlopeNorm
     from matplotlib.patches import Polygon
@@ -257,10 +288,17 @@ def wall_picture(run, folder):
                         )
                     )
                     if distance < 0 and not run.solve.contact:
-                        ax.plot(x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False)
+                        ax.plot(
+                            x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False
+                        )
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
-        ax.set_title("upper chambers" if side > 0 else "lower chambers (seen through the body)", fontsize=9, loc="left", pad=7)
+        ax.set_title(
+            "upper chambers" if side > 0 else "lower chambers (seen through the body)",
+            fontsize=9,
+            loc="left",
+            pad=7,
+        )
         ax.set_yticks([])
         ax.tick_params(labelsize=8)
         for edge in ("left", "right", "top"):
@@ -275,7 +313,9 @@ def wall_picture(run, folder):
     return [
         (
             "walls.png",
-            "Plan of the body at rest (x in mm), gaps coloured by the smallest distance of their walls, last step. "
-            "Red triangles mark overlap.",
+            (
+                "Plan of the body at rest (x in mm), gaps coloured by the smallest distance of their walls,"
+                " last step. Red triangles mark overlap."
+            ),
         )
     ]

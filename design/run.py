@@ -28,10 +28,10 @@ GIVEN_NOTE = "split given by the user"
 def run_design(target_path, directory, law=None, objective=PAIRED, say=print, outside=WARN):
     """Design a manipulator for the target in a CSV or TOML file; returns the `Design`.
 
-    law: a SegmentLaw, by default the trained one that comes along. objective: 'paired' or 'eq27' (see docs/use-design.md).
-    outside: 'warn' or 'refuse' a design that the law doubts. Writes design.toml, target.csv, centreline.csv, design.png and
-    run.json in `directory`, all of them once the design is found. InputError before anything is written; ConvergenceError
-    where the law has no answer.
+    law: a SegmentLaw, by default the trained one that comes along. objective: 'paired' or 'eq27' (see
+    docs/use-design.md). outside: 'warn' or 'refuse' a design that the law doubts. Writes design.toml,
+    target.csv, centreline.csv, design.png and run.json in `directory`, all of them once the design is found.
+    InputError before anything is written; ConvergenceError where the law has no answer.
     """
     started = time.perf_counter()
     if objective not in OBJECTIVES:
@@ -105,7 +105,8 @@ def describe(piece):
 
 
 def predicted(kind, strains):
-    """What the law predicts for the active part of a piece's segment, by file key; rates per deformed length."""
+    """What the law predicts for the active part of a piece's segment, by file key; rates per deformed
+    length."""
     table = {
         "stretch": float(strains.stretch),
         "k1_rad_per_mm": float(strains.k[0]),
@@ -129,8 +130,9 @@ def summary(design, solution, errors, seconds):
     for i, (segment, piece) in enumerate(zip(design.manipulator.segments, design.result["piece"]), start=1):
         base = f"{segment.base_thickness:6.2f}" if segment.kind != TWISTING_KIND else "     -"
         yield (
-            f"  {i} {segment.kind:9s}{segment.angle:6.1f}  {segment.chambers:8d}  {segment.chamber_height:6.2f}  "
-            f"{base}  {segment.gap:6.2f}  {segment.length:6.1f}   {_rates(piece)}   {_rates(piece['predicted'])}"
+            f"  {i} {segment.kind:9s}{segment.angle:6.1f}  {segment.chambers:8d} "
+            f" {segment.chamber_height:6.2f}  {base}  {segment.gap:6.2f}  {segment.length:6.1f}  "
+            f" {_rates(piece)}   {_rates(piece['predicted'])}"
         )
     length = f"undeformed length {design.manipulator.length:.1f} mm"
     yield f"pressure {1e3 * design.pressure:.2f} kPa, {length}, {seconds:.0f} s"

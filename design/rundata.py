@@ -35,13 +35,13 @@ STEP_COLUMNS = [
 class Solve:
     """The finite element solution. Lengths in mm, body frame; kPa as in the files.
 
-    steps: {column: (n,)}, "seconds" counted from the start; pressure of the last accepted step in MPa; s (m,),
-    points (m, 3): its centreline; strains: RodStrains of shape (segments, 3) at that step; walls: [(segment 1..,
-    side +1/-1, gap 1.., distance)] of the gaps that have walls; history: [(pressure in MPa, s,
+    steps: {column: (n,)}, "seconds" counted from the start; pressure of the last accepted step in MPa; s
+    (m,), points (m, 3): its centreline; strains: RodStrains of shape (segments, 3) at that step; walls:
+    [(segment 1.., side +1/-1, gap 1.., distance)] of the gaps that have walls; history: [(pressure in MPa, s,
     points)] of all steps; solution: the ParaView file, or None; record: run.json.
 
-    From the first touch of walls without contact, or of parts that are far apart along the body, the steps are marked
-    (columns walls_overlap, body_overlap): they are not what a real body does.
+    From the first touch of walls without contact, or of parts that are far apart along the body, the steps
+    are marked (columns walls_overlap, body_overlap): they are not what a real body does.
     """
 
     steps: dict
@@ -70,8 +70,9 @@ class Solve:
 
 @dataclass(frozen=True)
 class Run:
-    """directory; design; target (n, 3) and centreline (s (m,), points (m, 3)) in target coordinates; mesh, record: the
-    JSON files; solve; stale: the folder holds a solution of another body, or under other loads, than design.toml's, which is left out."""
+    """directory; design; target (n, 3) and centreline (s (m,), points (m, 3)) in target coordinates; mesh,
+    record: the JSON files; solve; stale: the folder holds a solution of another body, or under other loads,
+    than design.toml's, which is left out."""
 
     directory: Path
     design: Design
@@ -131,7 +132,9 @@ def _solve(directory):
     last = table[-1, 0]
     centrelines = read_columns(directory / "centrelines.csv", ["step", "s_mm", *POINTS])
     centreline = centrelines[centrelines[:, 0] == last]
-    strains = read_columns(directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"])
+    strains = read_columns(
+        directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"]
+    )
     strains = strains[strains[:, 0] == last]
     solution = directory / "solution.pvd"
     return Solve(
@@ -157,5 +160,8 @@ def _walls(path):
         return []
     header, rows = read_csv(path)
     read = [dict(zip(header, row)) for row in rows]
-    found = [(int(r["segment"]), 1 if r["side"] == "top" else -1, int(r["gap"]), float(r["distance_mm"])) for r in read]
+    found = [
+        (int(r["segment"]), 1 if r["side"] == "top" else -1, int(r["gap"]), float(r["distance_mm"]))
+        for r in read
+    ]
     return [gap for gap in found if np.isfinite(gap[3])]

@@ -8,7 +8,8 @@ ROW = 0.24  # inches between dimension lines
 
 
 def section_groups(manipulator):
-    """Lists of segment indices that share the same cross-section (everything but angle, number, ends and material)."""
+    """Lists of segment indices that share the same cross-section (everything but angle, number, ends and
+    material)."""
     groups = {}
     for i, s in enumerate(manipulator.segments):
         key = (
@@ -32,9 +33,12 @@ def section_groups(manipulator):
 
 
 def section_scale(s, width, height):
-    """Inches per mm at which both sections of a segment leave room for their dimensions in a panel (inches)."""
+    """Inches per mm at which both sections of a segment leave room for their dimensions in a panel
+    (inches)."""
     normal_width = 2 * s.chamber_thickness + s.gap + 3.0
-    return min((width - 2.05) / max(s.width, normal_width), (height - 1.95) / (s.chamber_top - s.chamber_bottom))
+    return min(
+        (width - 2.05) / max(s.width, normal_width), (height - 1.95) / (s.chamber_top - s.chamber_bottom)
+    )
 
 
 def _named(group, what):
@@ -55,8 +59,16 @@ def cross_section(figure, rectangle, scale, manipulator, group):
     view.axes_cross()
     top, low = s.chamber_top, s.chamber_bottom
     view.heading(_named(group, "through a chamber, along x"))
-    view.horizontal(-s.cavity_width / 2, s.cavity_width / 2, s.cavity_top, top + view.mm(0.2), f"cavity {plain(s.cavity_width)}")
-    view.horizontal(s.cavity_width / 2, half, s.cavity_top, top + view.mm(0.2 + ROW), f"side wall {plain(s.side_wall)}")
+    view.horizontal(
+        -s.cavity_width / 2,
+        s.cavity_width / 2,
+        s.cavity_top,
+        top + view.mm(0.2),
+        f"cavity {plain(s.cavity_width)}",
+    )
+    view.horizontal(
+        s.cavity_width / 2, half, s.cavity_top, top + view.mm(0.2 + ROW), f"side wall {plain(s.side_wall)}"
+    )
     view.horizontal(
         -s.channel_width / 2,
         s.channel_width / 2,
@@ -73,7 +85,9 @@ def cross_section(figure, rectangle, scale, manipulator, group):
     below = "roof" if s.kind == TWISTING else "base"
     if s.layer_thickness:
         view.horizontal(-half, half, s.layer_top, s.layer_top, f"layer {plain(s.layer_thickness)}")
-    core.insert(0, (s.core_bottom, -s.channel_height / 2, f"{below} {plain(-s.channel_height / 2 - s.core_bottom)}"))
+    core.insert(
+        0, (s.core_bottom, -s.channel_height / 2, f"{below} {plain(-s.channel_height / 2 - s.core_bottom)}")
+    )
     view.ladder(core, half, half + view.mm(0.2))
 
 
@@ -83,14 +97,18 @@ def normal_section(figure, rectangle, scale, manipulator, group):
     pairs = min(2, max(manipulator.segments[i].chambers for i in group))
     step, margin = s.chamber_thickness + s.gap, 1.5
     stop = (pairs - 1) * step + s.chamber_thickness
-    view = SheetView(figure, rectangle, scale, stop / 2, (s.chamber_top + s.chamber_bottom) / 2, right=-0.3, up=0.22)
+    view = SheetView(
+        figure, rectangle, scale, stop / 2, (s.chamber_top + s.chamber_bottom) / 2, right=-0.3, up=0.22
+    )
     solids = [(-margin, stop + margin, s.core_bottom, s.core_top)]
     voids = [(-margin - 1, stop + margin + 1, -s.channel_height / 2, s.channel_height / 2)]
     for side in s.sides:
         for k in range(pairs):
             x = k * step
             solids.append((x, x + s.chamber_thickness, 0.0, side * s.chamber_top))
-            voids.append((x + s.wall, x + s.wall + s.cavity_thickness, side * s.cavity_floor, side * s.cavity_top))
+            voids.append(
+                (x + s.wall, x + s.wall + s.cavity_thickness, side * s.cavity_floor, side * s.cavity_top)
+            )
     view.cut(solids, voids, segment_colour(group[0]), clip=(-margin, stop + margin))
     top, low = s.chamber_top, s.chamber_bottom
     view.heading(_named(group, "normal to the chambers"))
@@ -108,4 +126,10 @@ def normal_section(figure, rectangle, scale, manipulator, group):
     if s.cavity_floor > 0:
         heights.insert(0, (0.0, s.cavity_floor, f"floor {plain(s.cavity_floor)}"))
     view.ladder(heights, stop, edge + view.mm(0.15))
-    view.vertical(s.core_bottom, s.core_top, -margin, -margin - view.mm(0.25), f"core {plain(s.core_top - s.core_bottom)}")
+    view.vertical(
+        s.core_bottom,
+        s.core_top,
+        -margin,
+        -margin - view.mm(0.25),
+        f"core {plain(s.core_top - s.core_bottom)}",
+    )

@@ -1,9 +1,10 @@
 """A simple split of a bare curve into straight, bending and helical pieces.
 
-Few pieces of uniform curvature and torsion that together fit the points: dynamic programming over a grid of joints,
-with the fit of every candidate piece weighed against its number of rates. It is simple because it judges each piece by
-itself: it never sees that two neighbouring arcs would need a twist between them, and it finds no twist where the curve
-is nowhere straight. Straight pieces become twisting ones, whose twist is read off the arcs on either side.
+Few pieces of uniform curvature and torsion that together fit the points: dynamic programming over a grid of
+joints, with the fit of every candidate piece weighed against its number of rates. It is simple because it
+judges each piece by itself: it never sees that two neighbouring arcs would need a twist between them, and it
+finds no twist where the curve is nowhere straight. Straight pieces become twisting ones, whose twist is read
+off the arcs on either side.
 """
 
 import numpy as np
@@ -17,7 +18,10 @@ GRID = 18  # joints tried along the curve
 TOLERANCE = 0.001  # of the curve's length: a fit this good is good enough
 PRICE = 0.1  # of a rate, in units of a misfit of TOLERANCE over the whole curve
 RATES = {TWISTING: 1, BENDING: 2, HELICAL: 3}
-NOTE = "simple automatic split (no twist is sought where the curve is not straight): give [[piece]] tables to split it yourself"
+NOTE = (
+    "simple automatic split (no twist is sought where the curve is not straight): give [[piece]] tables to"
+    " split it yourself"
+)
 
 
 def split(points):
@@ -61,10 +65,13 @@ def _kind_and_cost(points, low, high, length):
 
 
 def _refined(points, kinds, ends, step, shortest, length):
-    """Joints moved by halves of the grid's step, down to 1/16, while that lowers the misfit of the two pieces."""
+    """Joints moved by halves of the grid's step, down to 1/16, while that lowers the misfit of the two
+    pieces."""
 
     def misfit(i):
-        return _misfit(points, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(points, ends[i], ends[i + 1], kinds[i], length)
+        return _misfit(points, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(
+            points, ends[i], ends[i + 1], kinds[i], length
+        )
 
     ends = list(ends)
     for move in (step / 2, step / 4, step / 8, step / 16):

@@ -1,4 +1,5 @@
-"""`pneunet shape`: the reduced model alone, at any pressures: centrelines, bodies, a picture and an animation."""
+"""`pneunet shape`: the reduced model alone, at any pressures: centrelines, bodies, a picture and an
+animation."""
 
 from pathlib import Path
 
@@ -18,13 +19,14 @@ FRAME_PIXELS = (540, 432)
 
 
 def run_shape(design_path, pressures, directory, say=print, law=None, outside=WARN):
-    """Shapes of a design at `pressures` (MPa) by a SegmentLaw, written to directory/shape; by default the trained one that comes along.
+    """Shapes of a design at `pressures` (MPa) by a SegmentLaw, written to directory/shape; by default the
+    trained one that comes along.
 
     outside: 'warn' or 'refuse' where the law doubts the design at one of the pressures.
 
-    centrelines.csv (pressure_kPa, s_mm, x_mm, y_mm, z_mm in target coordinates), body_<pressure>kPa.vtp, bodies.png,
-    inflation.gif, run.json. Pressures beyond the law's limit: the others are written, then ConvergenceError names
-    what is there. Returns the folder.
+    centrelines.csv (pressure_kPa, s_mm, x_mm, y_mm, z_mm in target coordinates), body_<pressure>kPa.vtp,
+    bodies.png, inflation.gif, run.json. Pressures beyond the law's limit: the others are written, then
+    ConvergenceError names what is there. Returns the folder.
     """
     if not pressures:
         raise InputError("--pressure-kPa: give at least one pressure")
@@ -51,7 +53,10 @@ def run_shape(design_path, pressures, directory, say=print, law=None, outside=WA
     say(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
     for p, line in shapes.items():
         tip = line.points[-1]
-        say(f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f}, {tip[2]:.1f}) mm")
+        say(
+            f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f},"
+            f" {tip[2]:.1f}) mm"
+        )
     try:
         _pictures(design, shapes, law, folder, say)
     except ImportError as error:
@@ -66,7 +71,9 @@ def run_shape(design_path, pressures, directory, say=print, law=None, outside=WA
     )
     if failed:
         first = min(failed)
-        raise ConvergenceError(f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa")
+        raise ConvergenceError(
+            f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa"
+        )
     return folder
 
 
@@ -82,7 +89,9 @@ def _pictures(design, shapes, law, folder, say):
     for p, body in bodies.items():
         with atomic_path(folder / f"body_{plain(p * 1e3)}kPa.vtp") as temporary:
             body.save(temporary)
-    _picture_of_all(design, view_of(np.vstack([body.points for body in bodies.values()])), bodies, folder / "bodies.png")
+    _picture_of_all(
+        design, view_of(np.vstack([body.points for body in bodies.values()])), bodies, folder / "bodies.png"
+    )
     say(f"bodies at every pressure: {folder / 'bodies.png'}")
     highest = max(shapes)
     if highest > 0:
@@ -115,7 +124,9 @@ def _picture_of_all(design, view, bodies, path):
             weight="bold",
             va="top",
         )
-    fig.text(0.2 / width, 1 - 0.12 / height, f"{design.name}: reduced model", fontsize=16, weight="bold", va="top")
+    fig.text(
+        0.2 / width, 1 - 0.12 / height, f"{design.name}: reduced model", fontsize=16, weight="bold", va="top"
+    )
     save(fig, path, dpi=90)
 
 

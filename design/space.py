@@ -1,4 +1,5 @@
-"""The design space: start dimensions, what varies in each kind of segment, ranges that grow to castable limits."""
+"""The design space: start dimensions, what varies in each kind of segment, ranges that grow to castable
+limits."""
 
 from dataclasses import dataclass, replace
 
@@ -83,7 +84,8 @@ class Variable:
 
 
 def prototype(target, piece):
-    """The Segment with a piece's start dimensions: material and shared dimensions are the same for all pieces."""
+    """The Segment with a piece's start dimensions: material and shared dimensions are the same for all
+    pieces."""
     kind = TWISTING_KIND if piece.kind == TWISTING else ONE_SIDED
     try:
         return Segment(kind, 90.0, 1, **(START[kind] | target.start), material=target.material)

@@ -21,9 +21,13 @@ SHIPPED = Path(__file__).resolve().parent.parent / "examples" / "targets"
 POINT_COLUMNS = ("x_mm", "y_mm", "z_mm")
 FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
 
-#: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are found, and
-#: a bottom layer is no variable of the inverse design
-START_KEYS = {file_key(f): f.name for f in fields(Segment) if f.metadata.get("unit") == "mm" and f.name != "layer_thickness"}
+#: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
+#: found, and a bottom layer is no variable of the inverse design
+START_KEYS = {
+    file_key(f): f.name
+    for f in fields(Segment)
+    if f.metadata.get("unit") == "mm" and f.name != "layer_thickness"
+}
 SHARED = ("width", "channel_width", "channel_height", "cavity_floor", "end_margin")
 VARY_KEYS = {"angle_deg": "angle"} | {key: name for key, name in START_KEYS.items() if name not in SHARED}
 
@@ -85,7 +89,10 @@ def _numbers(path, header, rows, skipped):
             raise InputError(f"{path} row {i + 1 + skipped}: {len(row)} columns instead of {len(header)}")
         for j, cell in enumerate(row):
             if not _is_number(cell) or not np.isfinite(float(cell)):
-                raise InputError(f"{path} row {i + 1 + skipped}: '{header[j]}' must be a finite number, not '{cell.strip()}'")
+                raise InputError(
+                    f"{path} row {i + 1 + skipped}: '{header[j]}' must be a finite number, not"
+                    f" '{cell.strip()}'"
+                )
             table[i, j] = float(cell)
     return dict(zip(header, table.T))
 
@@ -102,7 +109,17 @@ def _frames_of(values, where):
 # ---- TOML
 
 POINT_KEYS = ("target", "points", "points_mm", "frames")
-KEYS = ("name", *POINT_KEYS, "pressure_kPa", "pressure_range_kPa", "piece", "base", "material", "segment", "vary")
+KEYS = (
+    "name",
+    *POINT_KEYS,
+    "pressure_kPa",
+    "pressure_range_kPa",
+    "piece",
+    "base",
+    "material",
+    "segment",
+    "vary",
+)
 
 
 def _from_toml(path):
@@ -131,7 +148,8 @@ def _from_toml(path):
 
 
 def _on_shipped(table, path):
-    """The tables of the shipped target that `target` names, with the user's own in their place where given."""
+    """The tables of the shipped target that `target` names, with the user's own in their place where
+    given."""
     names = sorted(p.stem for p in SHIPPED.glob("*.toml"))
     if table["target"] not in names:
         known = ", ".join(names) or "none in this installation: give points instead"
@@ -147,7 +165,9 @@ def _on_shipped(table, path):
 
 def _toml_points(table, folder, where):
     if ("points" in table) == ("points_mm" in table):
-        raise InputError(f"{where}: give one of 'points' (a CSV file), 'points_mm' (a list of [x, y, z]) or 'target'")
+        raise InputError(
+            f"{where}: give one of 'points' (a CSV file), 'points_mm' (a list of [x, y, z]) or 'target'"
+        )
     if "points" in table:
         if not isinstance(table["points"], str):
             raise InputError(f"{where}: 'points' names a CSV file; write a list as 'points_mm'")
@@ -173,7 +193,9 @@ def _array(value, key, where, dimensions):
 
 def _pressure_range(table, where):
     if "pressure_kPa" in table and "pressure_range_kPa" in table:
-        raise InputError(f"{where}: 'pressure_kPa' (fixed) and 'pressure_range_kPa' exclude each other: give one")
+        raise InputError(
+            f"{where}: 'pressure_kPa' (fixed) and 'pressure_range_kPa' exclude each other: give one"
+        )
     if "pressure_kPa" in table:
         low = high = number(table["pressure_kPa"], "pressure_kPa", where)
         key = "pressure_kPa"
@@ -183,7 +205,10 @@ def _pressure_range(table, where):
     else:
         return None
     if not 0 < low <= high <= 1e3 * PRESSURE_LIMIT:
-        raise InputError(f"{where}: {key} = {table[key]} must lie in 0..{1e3 * PRESSURE_LIMIT:g} kPa (above it the chambers leak)")
+        raise InputError(
+            f"{where}: {key} = {table[key]} must lie in 0..{1e3 * PRESSURE_LIMIT:g} kPa (above it the"
+            " chambers leak)"
+        )
     return low * MPA_PER_KPA, high * MPA_PER_KPA
 
 
@@ -199,7 +224,14 @@ def _range(value, key, where):
 PIECE_KEYS = {
     TWISTING: ("kind", "length_mm", "tau_rad_per_mm"),
     BENDING: ("kind", "length_mm", "curvature_per_m"),
-    HELICAL: ("kind", "length_mm", "cylinder_curvature_per_m", "pitch_mm", "curvature_per_m", "torsion_rad_per_m"),
+    HELICAL: (
+        "kind",
+        "length_mm",
+        "cylinder_curvature_per_m",
+        "pitch_mm",
+        "curvature_per_m",
+        "torsion_rad_per_m",
+    ),
 }
 
 
@@ -224,7 +256,9 @@ def _piece(row, where):
     if kind == HELICAL:
         curvature, twist = _helix(value, curvature, where)
     if curvature is not None and curvature <= 0:
-        raise InputError(f"{where}: a curvature must be larger than 0 (its direction follows from the points)")
+        raise InputError(
+            f"{where}: a curvature must be larger than 0 (its direction follows from the points)"
+        )
     return Piece(kind, float(value["length_mm"]), twist, curvature)
 
 
@@ -236,11 +270,16 @@ def _helix(value, curvature, where):
         return None, None
     if set(given) == set(cylinder):
         if value[cylinder[0]] <= 0:
-            raise InputError(f"{where}: cylinder_curvature_per_m = {value[cylinder[0]]:g} must be larger than 0")
+            raise InputError(
+                f"{where}: cylinder_curvature_per_m = {value[cylinder[0]]:g} must be larger than 0"
+            )
         return helix_frenet(value[cylinder[0]] * PER_MM_PER_M, value["pitch_mm"])
     if set(given) == set(frenet):
         return curvature, value["torsion_rad_per_m"] * PER_MM_PER_M
-    raise InputError(f"{where}: a helix is given by {' and '.join(cylinder)}, or by {' and '.join(frenet)} (Frenet), or not at all")
+    raise InputError(
+        f"{where}: a helix is given by {' and '.join(cylinder)}, or by {' and '.join(frenet)} (Frenet), or"
+        " not at all"
+    )
 
 
 def _base(table, where):

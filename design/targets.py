@@ -17,8 +17,8 @@ PRESSURE_LIMIT = 0.060  # MPa; beyond it silicone pneu-nets leak (Jiang et al. 2
 class Piece:
     """A part of the target that one segment is to follow; lengths and rates per *deformed* length.
 
-    length in mm; twist in rad/mm: the twist tau of a twisting piece, the torsion of a helical one; curvature in 1/mm
-    (Frenet's). None = to be extracted from the points.
+    length in mm; twist in rad/mm: the twist tau of a twisting piece, the torsion of a helical one; curvature
+    in 1/mm (Frenet's). None = to be extracted from the points.
     """
 
     kind: str
@@ -31,10 +31,10 @@ class Piece:
 class Target:
     """points (n, 3) in mm from base to tip, and optionally
 
-    frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); pieces: the split;
-    base_direction, base_width (3,): unit vectors that fix the base (width None = its roll stays free);
-    pressure_range (low, high) in MPa, equal = fixed; material; start: {field of Segment: mm};
-    vary: {field of Segment: (low, high)} or None for the default choice.
+    frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); pieces: the
+    split; base_direction, base_width (3,): unit vectors that fix the base (width None = its roll stays free);
+    pressure_range (low, high) in MPa, equal = fixed; material; start: {field of Segment: mm}; vary: {field of
+    Segment: (low, high)} or None for the default choice.
     """
 
     points: np.ndarray
@@ -67,7 +67,9 @@ class Target:
         """Rotation (3, 3) of a base that is fixed altogether, else None."""
         if self.base_width is None:
             return None
-        return np.column_stack([self.base_direction, self.base_width, np.cross(self.base_direction, self.base_width)])
+        return np.column_stack(
+            [self.base_direction, self.base_width, np.cross(self.base_direction, self.base_width)]
+        )
 
 
 def check_points(points):
@@ -85,7 +87,9 @@ def check_points(points):
     if len(repeated):
         raise InputError(f"points {repeated[0] + 1} and {repeated[0] + 2} are the same: remove one")
     if not 10 <= length <= 2000:
-        raise InputError(f"the curve is {length:.4g} mm long, outside 10..2000 mm: are its coordinates in mm?")
+        raise InputError(
+            f"the curve is {length:.4g} mm long, outside 10..2000 mm: are its coordinates in mm?"
+        )
 
 
 def _checked_frames(frames, points):
@@ -96,18 +100,25 @@ def _checked_frames(frames, points):
     wrong = abs(np.swapaxes(frames, 1, 2) @ frames - np.eye(3)).max(axis=(1, 2)) > 1e-3
     wrong |= np.linalg.det(frames) < 0
     if wrong.any():
-        raise InputError(f"frame {np.argmax(wrong) + 1} is not a right-handed set of orthogonal unit vectors t1, t2, t3")
+        raise InputError(
+            f"frame {np.argmax(wrong) + 1} is not a right-handed set of orthogonal unit vectors t1, t2, t3"
+        )
     chords = np.diff(points, axis=0)
-    if np.sum(chords * (frames[:-1, :, 0] + frames[1:, :, 0]) / 2) < 0.5 * np.linalg.norm(chords, axis=1).sum():
+    if (
+        np.sum(chords * (frames[:-1, :, 0] + frames[1:, :, 0]) / 2)
+        < 0.5 * np.linalg.norm(chords, axis=1).sum()
+    ):
         raise InputError("frames: t1 does not point along the curve, from base to tip")
     return frames
 
 
 def _fitted_to(pieces, length):
-    """The pieces with lengths scaled to add up to the curve's; more than a rounding apart is the user's mistake."""
+    """The pieces with lengths scaled to add up to the curve's; more than a rounding apart is the user's
+    mistake."""
     total = sum(p.length for p in pieces)
     if abs(total - length) > LENGTH_TOLERANCE * length:
         raise InputError(
-            f"[[piece]] length_mm: the pieces add up to {total:.4g} mm but the curve is {length:.4g} mm long (lengths are deformed ones)"
+            f"[[piece]] length_mm: the pieces add up to {total:.4g} mm but the curve is {length:.4g} mm long"
+            " (lengths are deformed ones)"
         )
     return tuple(Piece(p.kind, p.length * length / total, p.twist, p.curvature) for p in pieces)

@@ -25,7 +25,8 @@ def step(*arguments, may_stop_short=False):
 def main():
     started = time.perf_counter()
     design = str(OUT / "design.toml")
-    shutil.rmtree(ROOT / OUT / "solve", ignore_errors=True)  # an earlier design's, perhaps an earlier version's
+    # an earlier design's, perhaps an earlier version's
+    shutil.rmtree(ROOT / OUT / "solve", ignore_errors=True)
     step("design", "examples/targets/octopus.toml", "-o", str(OUT))
     step("shape", design)
     step("mesh", design)

@@ -1,8 +1,9 @@
 """Regenerate examples/targets/*.csv from their numbers: `python -m examples.make_targets [FOLDER]`.
 
-octopus and tentacle2 are rods of piecewise uniform twist and curvature (per *deformed* length); octopus is the paper's
-(Jiang et al. 2021, Sec. IV D). vase and pear are wraps of a surface of revolution, for which the paper prints no
-numbers: they are fixed here. Every curve has 201 points, evenly spaced in arc length, in mm to 4 decimals.
+octopus and tentacle2 are rods of piecewise uniform twist and curvature (per *deformed* length); octopus is
+the paper's (Jiang et al. 2021, Sec. IV D). vase and pear are wraps of a surface of revolution, for which the
+paper prints no numbers: they are fixed here. Every curve has 201 points, evenly spaced in arc length, in mm
+to 4 decimals.
 """
 
 import sys
@@ -15,14 +16,15 @@ from base.files import write_text
 from base.strains import helix_frenet
 
 POINTS = 201
-DENSE = 20001  # points on a wrap before it is sampled evenly; its chords then miss arc length by less than 1e-6 mm
+#: points on a wrap before it is sampled evenly; its chords then miss arc length by less than 1e-6 mm
+DENSE = 20001
 
 
 def rod(pieces):
     """Points (201, 3) of a rod that starts at the origin along +x with its width along +y.
 
-    pieces: (length mm, twist rad/mm, curvature 1/mm) each. Curvature bends the rod towards its -z, as a one-sided
-    segment with its chambers on top does.
+    pieces: (length mm, twist rad/mm, curvature 1/mm) each. Curvature bends the rod towards its -z, as a
+    one-sided segment with its chambers on top does.
     """
     lengths = np.array([piece[0] for piece in pieces], float)
     screws = np.array([[twist, curvature, 0, 1, 0, 0] for _, twist, curvature in pieces])
@@ -37,7 +39,8 @@ def rod(pieces):
 
 
 def wrap(radius, slope, z_from, z_to, turns, offset=6.0):
-    """Points (201, 3) of a curve around the surface r(z), `offset` mm outside it along the normal, z linear in angle.
+    """Points (201, 3) of a curve around the surface r(z), `offset` mm outside it along the normal, z linear
+    in angle.
 
     The offset is half the manipulator's width: the body then lies on the surface.
     """
@@ -52,7 +55,8 @@ def wrap(radius, slope, z_from, z_to, turns, offset=6.0):
 
 
 def octopus():
-    """0.01 pi rad/mm over 50 mm; 18 1/m over 30 mm; helix of cylinder curvature 70 1/m, pitch 90 mm over 100 mm."""
+    """0.01 pi rad/mm over 50 mm; 18 1/m over 30 mm; helix of cylinder curvature 70 1/m, pitch 90 mm over 100
+    mm."""
     curvature, torsion = helix_frenet(0.070, 90.0)
     return rod([(50, 0.01 * np.pi, 0), (30, 0, 0.018), (100, torsion, curvature)])
 

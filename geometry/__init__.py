@@ -1,4 +1,5 @@
-"""What is built: pneu-net segments and manipulators as parameters, CAD, meshes. The CAD modules import gmsh."""
+"""What is built: pneu-net segments and manipulators as parameters, CAD, meshes. The CAD modules import
+gmsh."""
 
 from geometry.parameters import Manipulator, Segment
 

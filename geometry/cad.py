@@ -1,8 +1,8 @@
 """Parametric CAD of a manipulator in gmsh's OpenCASCADE kernel.
 
-Recipe: parallelogram prisms from plan polygons; the outer solids of each segment fused; all cavities fused with the
-channel; everything fragmented, so that the boundary of the cavity volumes is the exact cavity surface. The cavities
-are then removed and the faces tagged.
+Recipe: parallelogram prisms from plan polygons; the outer solids of each segment fused; all cavities fused
+with the channel; everything fragmented, so that the boundary of the cavity volumes is the exact cavity
+surface. The cavities are then removed and the faces tagged.
 """
 
 from contextlib import contextmanager
@@ -42,7 +42,8 @@ def prism(corners, z0, z1):
 
 
 def slanted_plan(x, thickness, half_width, segment, side):
-    """Plan corners (4, 2) of a chamber centred at x: `thickness` normal, between y = -half_width and +half_width."""
+    """Plan corners (4, 2) of a chamber centred at x: `thickness` normal, between y = -half_width and
+    +half_width."""
     half = thickness / segment.sin / 2
     slant = segment.cot * half_width * side
     return np.array(
@@ -83,7 +84,8 @@ def outer_solids(segment, start):
 
 
 def cavity_solids(segment, start, channel_from, channel_to):
-    """Volume tags of one segment's chamber cavities and its stretch of channel (clipped to the given x range)."""
+    """Volume tags of one segment's chamber cavities and its stretch of channel (clipped to the given x
+    range)."""
     s = segment
     tags = []
     x0, x1 = max(start, channel_from), min(start + s.length, channel_to)
@@ -91,13 +93,21 @@ def cavity_solids(segment, start, channel_from, channel_to):
         tags.append(box(x0, x1, s.channel_width / 2, -s.channel_height / 2, s.channel_height / 2))
     for x in start + s.chamber_positions:
         for side in s.sides:
-            tags.append(chamber_block(s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top))
+            tags.append(
+                chamber_block(
+                    s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top
+                )
+            )
     return tags
 
 
 def layer_solid(segment, start, stop):
     """[volume tag] of the bottom layer between two x (mm); empty when the segment has none."""
-    return [box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)] if segment.layer_thickness else []
+    return (
+        [box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)]
+        if segment.layer_thickness
+        else []
+    )
 
 
 def pieces(children):
@@ -106,8 +116,8 @@ def pieces(children):
 
 
 def channel_range(manipulator):
-    """x (mm) at which the channel begins and ends: half a pitch beyond the first and the last chamber, so that every
-    chamber has its whole cell; what remains of the passive ends closes it."""
+    """x (mm) at which the channel begins and ends: half a pitch beyond the first and the last chamber, so
+    that every chamber has its whole cell; what remains of the passive ends closes it."""
     first, last = manipulator.segments[0], manipulator.segments[-1]
     return (
         first.chamber_positions[0] - first.pitch / 2,
@@ -116,11 +126,11 @@ def channel_range(manipulator):
 
 
 def build(manipulator):
-    """Build the manipulator in the current gmsh model: one body volume per segment (two with a bottom layer), tagged faces,
-    one closed cavity.
+    """Build the manipulator in the current gmsh model: one body volume per segment (two with a bottom layer),
+    tagged faces, one closed cavity.
 
-    Returns the CAD volumes {"body_mm3", "cavity_mm3"}. Raises InputError when the cavity is not one piece or a
-    segment falls apart.
+    Returns the CAD volumes {"body_mm3", "cavity_mm3"}. Raises InputError when the cavity is not one piece or
+    a segment falls apart.
     """
     occ = gmsh.model.occ
     start_stop = channel_range(manipulator)
@@ -134,7 +144,10 @@ def build(manipulator):
     _, parents = occ.fragment(bodies, cavities + layers)
     occ.synchronize()
     inner = len(bodies) + len(cavities)
-    cavity_volumes, layer_volumes = sorted(pieces(parents[len(bodies) : inner])), sorted(pieces(parents[inner:]))
+    cavity_volumes, layer_volumes = (
+        sorted(pieces(parents[len(bodies) : inner])),
+        sorted(pieces(parents[inner:])),
+    )
     body_volumes = sorted(pieces(parents[: len(bodies)]) - set(cavity_volumes))
     volumes = {
         "body_mm3": sum(occ.getMass(*v) for v in body_volumes),
@@ -142,15 +155,24 @@ def build(manipulator):
     }
     if len(body_volumes) != len(manipulator.segments) + len(layers):
         raise InputError(
-            f"segment: the body falls into {len(body_volumes)} pieces instead of {len(manipulator.segments) + len(layers)}: "
-            "a wall is cut through by a cavity; check the wall and roof thicknesses"
+            f"segment: the body falls into {len(body_volumes)} pieces instead of"
+            f" {len(manipulator.segments) + len(layers)}: a wall is cut through by a cavity; check the wall"
+            " and roof thicknesses"
         )
     cavity_faces = {abs(t) for _, t in gmsh.model.getBoundary(cavity_volumes, combined=True, oriented=True)}
     body_faces = {abs(t) for _, t in gmsh.model.getBoundary(body_volumes, combined=True, oriented=True)}
     if not cavity_faces <= body_faces:
-        raise InputError("segment: the cavity breaks through the outer surface: check side_wall, top_wall and base_thickness")
+        raise InputError(
+            "segment: the cavity breaks through the outer surface: check side_wall, top_wall and"
+            " base_thickness"
+        )
     _tag_volumes(BODY, "segment", range(len(manipulator.segments)), set(body_volumes) - set(layer_volumes))
-    _tag_volumes(LAYER, "layer of segment", [i for i, s in enumerate(manipulator.segments) if s.layer_thickness], layer_volumes)
+    _tag_volumes(
+        LAYER,
+        "layer of segment",
+        [i for i, s in enumerate(manipulator.segments) if s.layer_thickness],
+        layer_volumes,
+    )
     _tag_faces(manipulator, body_faces, cavity_faces)
     occ.remove(cavity_volumes)
     occ.synchronize()
@@ -158,7 +180,8 @@ def build(manipulator):
 
 
 def in_channel(segment, box):
-    """Whether a cavity face with this bounding box (6 numbers) is a piece of the channel's wall (its ends are not)."""
+    """Whether a cavity face with this bounding box (6 numbers) is a piece of the channel's wall (its ends are
+    not)."""
     x0, y0, z0, x1, y1, z1 = box
     in_y = max(abs(y0), abs(y1)) < segment.channel_width / 2 + _TOLERANCE
     in_z = max(abs(z0), abs(z1)) < segment.channel_height / 2 + _TOLERANCE

@@ -1,6 +1,7 @@
 """One pitch of a uniform segment between two plane cuts, with matching faces on the cuts.
 
-Body and air are both meshed, and on demand the gaps between neighbouring chambers, the medium of hifi.contact.
+Body and air are both meshed, and on demand the gaps between neighbouring chambers, the medium of
+hifi.contact.
 """
 
 from pathlib import Path
@@ -19,9 +20,10 @@ AIR, GAP = 200, 400
 def mesh_cell(segment, mesh_size, path, cut=0.0, gaps=False, edge_size=None):
     """Write the cell's mesh to `path`; returns {"body_mm3", "air_mm3", "cells"}.
 
-    x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). `gaps`: mesh the space between the chambers
-    too. edge_size (mm): size at the body's edges, where stresses are singular; it grows from there to mesh_size; None = one size
-    everywhere. InputError when the faces on the two cuts do not match or the mesh fails.
+    x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). `gaps`: mesh the space between the
+    chambers too. edge_size (mm): size at the body's edges, where stresses are singular; it grows from there
+    to mesh_size; None = one size everywhere. InputError when the faces on the two cuts do not match or the
+    mesh fails.
     """
     half = segment.pitch / 2
     with cad.session("cell"):
@@ -57,7 +59,11 @@ def _build(segment, half, cut, gaps):
     for x in centres:
         for side in s.sides:
             outer.append(cad.chamber_block(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top))
-            inner.append(cad.chamber_block(s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top))
+            inner.append(
+                cad.chamber_block(
+                    s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top
+                )
+            )
     solids = []
     for tags, unify in ((outer, True), (inner, False)):
         slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
@@ -86,9 +92,14 @@ def _build(segment, half, cut, gaps):
 
 
 def _gap_solids(segment, half, centres):
-    """(dim, tag) of the space between neighbouring chambers, above the core and as wide as they are, between the cuts."""
+    """(dim, tag) of the space between neighbouring chambers, above the core and as wide as they are, between
+    the cuts."""
     s = segment
-    solids = [(3, cad.chamber_block(s, x, side, s.gap, s.width / 2, s.core_top, s.chamber_top)) for x in centres for side in s.sides]
+    solids = [
+        (3, cad.chamber_block(s, x, side, s.gap, s.width / 2, s.core_top, s.chamber_top))
+        for x in centres
+        for side in s.sides
+    ]
     slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
     return gmsh.model.occ.intersect(solids, [(3, slab)])[0]
 
@@ -99,7 +110,8 @@ def _on_cut(face, half):
 
 
 def _grade(half, near, far, slope=0.7):
-    """Sizes from `near` at every edge but those that only the cuts make, growing by `slope` per mm of distance up to `far`."""
+    """Sizes from `near` at every edge but those that only the cuts make, growing by `slope` per mm of
+    distance up to `far`."""
     starts, along = [], []
     for _, curve in gmsh.model.getEntities(1):
         points = gmsh.model.getBoundary([(1, curve)], oriented=False)
@@ -120,7 +132,9 @@ def _grade(half, near, far, slope=0.7):
 
 
 def _boundary(volumes):
-    return {abs(t) for _, t in gmsh.model.getBoundary([(3, v) for v in volumes], combined=True, oriented=True)}
+    return {
+        abs(t) for _, t in gmsh.model.getBoundary([(3, v) for v in volumes], combined=True, oriented=True)
+    }
 
 
 def _make_periodic(half, pitch):
@@ -139,7 +153,8 @@ def _make_periodic(half, pitch):
         images = [
             f
             for f, b in left
-            if np.abs(b[[1, 2, 4, 5]] - box[[1, 2, 4, 5]]).max() < tolerance and abs(gmsh.model.occ.getMass(2, f) - area) < tolerance
+            if np.abs(b[[1, 2, 4, 5]] - box[[1, 2, 4, 5]]).max() < tolerance
+            and abs(gmsh.model.occ.getMass(2, f) - area) < tolerance
         ]
         if len(images) != 1 or len(left) != len(right):
             raise InputError("cell: the faces on its two cuts do not match; move the cut")

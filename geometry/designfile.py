@@ -8,12 +8,32 @@ from base.errors import InputError
 from base.files import write_text
 from base.materials import material_from_table, material_to_table
 from base.tables import as_table, from_table, number, read_toml, refuse_unknown, to_table, toml_text
-from geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_contact, read_control, read_extras
+from geometry.loading import (
+    CONTACTS,
+    CONTROL_KEYS,
+    Control,
+    DeadLoads,
+    Extras,
+    read_contact,
+    read_control,
+    read_extras,
+)
 from geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
 KEYS = [
-    *("schema", "name", "pressure_kPa", "mesh_size_mm", "target", "material", "layer_material", "segment", "base", "result"),
+    *(
+        "schema",
+        "name",
+        "pressure_kPa",
+        "mesh_size_mm",
+        "target",
+        "material",
+        "layer_material",
+        "segment",
+        "base",
+        "result",
+    ),
     *("loads", "measure", "contact", *CONTROL_KEYS),
 ]
 
@@ -22,10 +42,11 @@ KEYS = [
 class Design:
     """What the commands mesh, shape and solve read.
 
-    pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm; target: text
-    that names the target file; result: free table of numbers that `pneunet design` adds and nobody reads back. loads,
-    control, measure and contact ('auto': walls of neighbouring chambers that touch are held apart; 'none': they are not) are for the
-    finite elements alone; a pressure of 0 goes with loads only.
+    pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm;
+    target: text that names the target file; result: free table of numbers that `pneunet design` adds and
+    nobody reads back. loads, control, measure and contact ('auto': walls of neighbouring chambers that touch
+    are held apart; 'none': they are not) are for the finite elements alone; a pressure of 0 goes with loads
+    only.
     """
 
     manipulator: Manipulator
@@ -64,7 +85,11 @@ def design_from_tables(data, path):
     if not 0.1 <= mesh_size <= 20:
         raise InputError(f"{path}: mesh_size_mm = {mesh_size:g} must lie in 0.1..20 mm")
     material = material_from_table(data["material"], f"{path} [material]")
-    layer_material = material_from_table(data["layer_material"], f"{path} [layer_material]") if "layer_material" in data else None
+    layer_material = (
+        material_from_table(data["layer_material"], f"{path} [layer_material]")
+        if "layer_material" in data
+        else None
+    )
     if not isinstance(data["segment"], list):
         raise InputError(f"{path}: segments are written [[segment]], with double brackets")
     segments = []
@@ -121,8 +146,8 @@ def _base_pose(table, where):
 
 
 def design_tables(design):
-    """The nested tables of design.toml; a segment's material is written only where it differs from the first one's, a layer's
-    with every layer."""
+    """The nested tables of design.toml; a segment's material is written only where it differs from the first
+    one's, a layer's with every layer."""
     first = design.manipulator.segments[0].material
     rows = []
     for s in design.manipulator.segments:
@@ -157,8 +182,14 @@ def design_tables(design):
 
 def body_tables(manipulator):
     """What a solution belongs to: every dimension and material of every segment, in file units."""
-    layers = [{} if s.layer_material is None else {"layer_material": material_to_table(s.layer_material)} for s in manipulator.segments]
-    return [{**to_table(s), "material": material_to_table(s.material), **layer} for s, layer in zip(manipulator.segments, layers)]
+    layers = [
+        {} if s.layer_material is None else {"layer_material": material_to_table(s.layer_material)}
+        for s in manipulator.segments
+    ]
+    return [
+        {**to_table(s), "material": material_to_table(s.material), **layer}
+        for s, layer in zip(manipulator.segments, layers)
+    ]
 
 
 def write_design(path, design):

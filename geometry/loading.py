@@ -1,4 +1,5 @@
-"""What acts on a manipulator beside its pressure, how the pressure is walked up, and what is measured at the end."""
+"""What acts on a manipulator beside its pressure, how the pressure is walked up, and what is measured at the
+end."""
 
 from dataclasses import dataclass, fields
 
@@ -12,10 +13,12 @@ CONTROLS = ("pressure", "volume", "arc length")
 
 @dataclass(frozen=True)
 class DeadLoads:
-    """Loads that keep their direction in space while the body moves, in the target's coordinates (where the base stands).
+    """Loads that keep their direction in space while the body moves, in the target's coordinates (where the
+    base stands).
 
-    gravity: acceleration (3,) in mm/s2, each material has its density; tip_force (3,) in N and tip_moment (3,) in N mm, spread
-    over the tip's face. They are put on together, in a ramp of their own, before the pressure.
+    gravity: acceleration (3,) in mm/s2, each material has its density; tip_force (3,) in N and tip_moment
+    (3,) in N mm, spread over the tip's face. They are put on together, in a ramp of their own, before the
+    pressure.
     """
 
     gravity: tuple = quantity("m_per_s2", (0.0, 0.0, 0.0))
@@ -34,7 +37,13 @@ class DeadLoads:
         """The loads that act, in words; '' without any."""
         words = []
         for key, value in self.table().items():
-            name, unit = ("gravity", "m/s2") if "gravity" in key else ("tip force", "N") if "force" in key else ("tip moment", "N mm")
+            name, unit = (
+                ("gravity", "m/s2")
+                if "gravity" in key
+                else ("tip force", "N")
+                if "force" in key
+                else ("tip moment", "N mm")
+            )
             words.append(f"{name} ({', '.join(f'{v:g}' for v in value)}) {unit}")
         return ", ".join(words)
 
@@ -45,9 +54,10 @@ class DeadLoads:
 
 @dataclass(frozen=True)
 class Control:
-    """What is prescribed along the path: 'pressure' up to the design's; 'volume' of the cavity up to `volume_factor` times the
-    one at rest, which walks through limit points of the pressure; or 'arc length', root mean square displacement of the nodes
-    summed along the path, up to `arc_length` mm, which walks through any limit point."""
+    """What is prescribed along the path: 'pressure' up to the design's; 'volume' of the cavity up to
+    `volume_factor` times the one at rest, which walks through limit points of the pressure; or 'arc length',
+    root mean square displacement of the nodes summed along the path, up to `arc_length` mm, which walks
+    through any limit point."""
 
     name: str = "pressure"
     volume_factor: float = quantity(None, 2.0)
@@ -66,9 +76,14 @@ def read_control(table, where):
     """The Control among the keys of a file's top table; InputError otherwise."""
     name = table.get("control", Control.name)
     if name not in CONTROLS:
-        raise InputError(f"{where}: control = {name!r} is not known: write 'pressure', 'volume' or 'arc length'")
+        raise InputError(
+            f"{where}: control = {name!r} is not known: write 'pressure', 'volume' or 'arc length'"
+        )
     values = {}
-    for key, owner, low, high in (("volume_factor", "volume", 1.001, 100.0), ("arc_length_mm", "arc length", 1e-3, 1e4)):
+    for key, owner, low, high in (
+        ("volume_factor", "volume", 1.001, 100.0),
+        ("arc_length_mm", "arc length", 1e-3, 1e4),
+    ):
         if key not in table:
             continue
         value = float(number(table[key], key, where))

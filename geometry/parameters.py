@@ -1,8 +1,10 @@
-"""The parameters of segments and manipulators, validated; `Manipulator` is what every package builds or predicts.
+"""The parameters of segments and manipulators, validated; `Manipulator` is what every package builds or
+predicts.
 
-Body axes: x along the undeformed centreline, y width, z height, z = 0 on the channel axis; mm, degrees. Chambers are
-upright boxes whose long side makes `angle` with x in plan. A one-sided segment has them above a core; a twisting one
-has a second set, the first turned by half a turn about x, so that twist adds up and bending cancels.
+Body axes: x along the undeformed centreline, y width, z height, z = 0 on the channel axis; mm, degrees.
+Chambers are upright boxes whose long side makes `angle` with x in plan. A one-sided segment has them above a
+core; a twisting one has a second set, the first turned by half a turn about x, so that twist adds up and
+bending cancels.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +25,9 @@ class Segment:
     """One run of equal chambers. "normal" = across the chamber."""
 
     kind: str = quantity(None, note="'one-sided' (bends, helical away from 90 deg) or 'twisting'")
-    angle: float = quantity("deg", note="between the chambers' long side and the x axis; 90 = across the beam")
+    angle: float = quantity(
+        "deg", note="between the chambers' long side and the x axis; 90 = across the beam"
+    )
     chambers: int = quantity(None, note="whole chambers (pairs, for a twisting segment)")
     width: float = quantity("mm", 12.0, "body width")
     chamber_height: float = quantity("mm", 4.0, "cavity, floor to ceiling")
@@ -38,7 +42,9 @@ class Segment:
     channel_height: float = quantity("mm", 2.0, "air channel, z")
     cavity_floor: float = quantity("mm", 1.0, "z of the cavity's floor; at most half the channel height")
     end_margin: float = quantity("mm", 2.0, "bare core beyond the outermost corner of a chamber, each end")
-    layer_thickness: float = quantity("mm", 0.0, "stiff layer at the bottom of the base (one-sided); 0 = none")
+    layer_thickness: float = quantity(
+        "mm", 0.0, "stiff layer at the bottom of the base (one-sided); 0 = none"
+    )
     material: Hyperelastic = NeoHookean(mu=0.317)
     layer_material: Hyperelastic | None = None
 
@@ -67,54 +73,69 @@ class Segment:
             if not value > 0:
                 raise InputError(f"{name}_mm = {value:g} must be larger than 0")
             if not 0.05 <= value <= 500:
-                raise InputError(f"{name}_mm = {value:g} is not a castable size (0.05..500 mm): is it in metres?")
+                raise InputError(
+                    f"{name}_mm = {value:g} is not a castable size (0.05..500 mm): is it in metres?"
+                )
         self._check_layer()
         if 2 * self.side_wall >= self.width:
-            raise InputError(f"side_wall_mm = {self.side_wall:g}: two side walls do not fit into width_mm = {self.width:g}")
+            raise InputError(
+                f"side_wall_mm = {self.side_wall:g}: two side walls do not fit into width_mm = {self.width:g}"
+            )
         if self.channel_width > self.cavity_width:
             raise InputError(
-                f"channel_width_mm = {self.channel_width:g} is wider than the cavity ({self.cavity_width:g} mm = width - 2 side walls)"
+                f"channel_width_mm = {self.channel_width:g} is wider than the cavity ({self.cavity_width:g}"
+                " mm = width - 2 side walls)"
             )
         lowest = 0.0 if self.kind == TWISTING else -self.channel_height / 2
         if not lowest <= self.cavity_floor <= self.channel_height / 2:
             raise InputError(
-                f"cavity_floor_mm = {self.cavity_floor:g} must lie in {lowest:g}..{self.channel_height / 2:g} (half the channel height), "
-                "else the cavity does not open into the channel"
+                f"cavity_floor_mm = {self.cavity_floor:g} must lie in {lowest:g}..{self.channel_height / 2:g}"
+                " (half the channel height), else the cavity does not open into the channel"
             )
         if self.chamber_top <= self.core_top:
             raise InputError(
-                f"chamber_height_mm = {self.chamber_height:g}: the chamber (top at z = {self.chamber_top:g} mm) does not rise above "
-                f"the core (z = {self.core_top:g} mm)"
+                f"chamber_height_mm = {self.chamber_height:g}: the chamber (top at z = {self.chamber_top:g}"
+                f" mm) does not rise above the core (z = {self.core_top:g} mm)"
             )
         if self.end_wall < 0.5 - 1e-9:
             needed = np.ceil(100 * (self.end_margin + 0.5 - self.end_wall) - 1e-6) / 100
             raise InputError(
-                f"end_margin_mm = {self.end_margin:g} leaves {self.end_wall:.2g} mm to close the channel's end: "
-                f"at least {needed:g} mm is needed with gap_mm = {self.gap:g}"
+                f"end_margin_mm = {self.end_margin:g} leaves {self.end_wall:.2g} mm to close the channel's"
+                f" end: at least {needed:g} mm is needed with gap_mm = {self.gap:g}"
             )
         if self.length > 2000:
-            raise InputError(f"chambers = {self.chambers}: the segment would be {self.length:.0f} mm long (at most 2000)")
+            raise InputError(
+                f"chambers = {self.chambers}: the segment would be {self.length:.0f} mm long (at most 2000)"
+            )
 
     def _check_layer(self):
         if not self.layer_thickness:
             if self.layer_material is not None:
-                raise InputError("layer_thickness_mm is missing or 0, but there is a layer material: give the layer's thickness")
+                raise InputError(
+                    "layer_thickness_mm is missing or 0, but there is a layer material: give the layer's"
+                    " thickness"
+                )
             return
         if self.kind == TWISTING:
-            raise InputError(f"layer_thickness_mm = {self.layer_thickness:g}: only a one-sided segment has a bottom layer")
+            raise InputError(
+                f"layer_thickness_mm = {self.layer_thickness:g}: only a one-sided segment has a bottom layer"
+            )
         if not 0.05 <= self.layer_thickness <= self.base_thickness - 0.05:
             raise InputError(
-                f"layer_thickness_mm = {self.layer_thickness:g} must lie in 0.05..{self.base_thickness - 0.05:g}: "
-                f"the layer is part of base_thickness_mm = {self.base_thickness:g}"
+                f"layer_thickness_mm = {self.layer_thickness:g} must lie in"
+                f" 0.05..{self.base_thickness - 0.05:g}: the layer is part of base_thickness_mm ="
+                f" {self.base_thickness:g}"
             )
         if self.layer_material is None:
             raise InputError(
-                f"layer_thickness_mm = {self.layer_thickness:g} needs a material: write [layer_material] or [segment.layer_material]"
+                f"layer_thickness_mm = {self.layer_thickness:g} needs a material: write [layer_material] or"
+                " [segment.layer_material]"
             )
 
     @property
     def key(self):
-        """Hashable identity of the cell: everything that the strains of the middle of a long segment depend on."""
+        """Hashable identity of the cell: everything that the strains of the middle of a long segment depend
+        on."""
         return replace(self, chambers=1, end_margin=1.0 + self.gap / self.sin / 2)
 
     @property
@@ -183,7 +204,8 @@ class Segment:
 
     @property
     def end_wall(self):
-        """What closes the channel at a free end, mm: the channel runs half a gap beyond the outermost chamber."""
+        """What closes the channel at a free end, mm: the channel runs half a gap beyond the outermost
+        chamber."""
         return self.end_length - self.gap / self.sin / 2
 
     @property
@@ -217,9 +239,13 @@ class Manipulator:
                 max(a.channel_height, b.channel_height) / 2,
                 max(a.channel_width, b.channel_width),
             )
-            covered = max(a.core_bottom, b.core_bottom) < -half_height and half_height < min(a.core_top, b.core_top)
+            covered = max(a.core_bottom, b.core_bottom) < -half_height and half_height < min(
+                a.core_top, b.core_top
+            )
             if not covered or min(a.width, b.width) <= channel_width:
-                raise InputError(f"segment {i} and {i + 1}: the channel of one does not fit into the core of the other")
+                raise InputError(
+                    f"segment {i} and {i + 1}: the channel of one does not fit into the core of the other"
+                )
 
     @property
     def length(self):
@@ -233,7 +259,9 @@ class Manipulator:
     @property
     def materials(self):
         """Every material of the body once, layers included."""
-        return tuple(dict.fromkeys(m for s in self.segments for m in (s.material, s.layer_material) if m is not None))
+        return tuple(
+            dict.fromkeys(m for s in self.segments for m in (s.material, s.layer_material) if m is not None)
+        )
 
     @property
     def chambers(self):

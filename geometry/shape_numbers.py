@@ -1,4 +1,5 @@
-"""A cell's shape without a length: what strains times a length depend on when the material has only one modulus."""
+"""A cell's shape without a length: what strains times a length depend on when the material has only one
+modulus."""
 
 from dataclasses import replace
 from operator import attrgetter
@@ -13,8 +14,9 @@ SHAPE = (
     *("base_thickness", "roof", "channel_width", "channel_height", "cavity_floor"),
 )
 _dimensions = attrgetter(*SHAPE)
-#: kind -> name -> changes of SHAPE by one: the directions in which designs differ when the normal pitch is the unit of length. Walls
-#: and cavities grow at the gap's cost; what a campaign ties together (hifi.campaign_sample) moves together
+#: kind -> name -> changes of SHAPE by one: the directions in which designs differ when the normal pitch is
+#: the unit of length. Walls and cavities grow at the gap's cost; what a campaign ties together
+#: (hifi.campaign_sample) moves together
 _OF_BOTH = {
     "angle": {"angle": 1.0},
     "width": {"width": 1.0},
@@ -48,7 +50,10 @@ def direction_matrix(kind):
 def changed(segment, change, step):
     """The Segment `step` along one of DIRECTIONS: degrees, or normal pitches."""
     length = normal_pitch(segment)
-    return replace(segment, **{n: getattr(segment, n) + step * by * (1 if n == "angle" else length) for n, by in change.items()})
+    return replace(
+        segment,
+        **{n: getattr(segment, n) + step * by * (1 if n == "angle" else length) for n, by in change.items()},
+    )
 
 
 def normal_pitch(segment):

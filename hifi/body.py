@@ -1,4 +1,5 @@
-"""A MixedProblem as a system for Newton's method: section-frame updates and a tangent that turns with the body."""
+"""A MixedProblem as a system for Newton's method: section-frame updates and a tangent that turns with the
+body."""
 
 import numpy as np
 from mpi4py import MPI
@@ -11,7 +12,8 @@ MOST_TOUCHES = 60
 
 
 class BodySystem:
-    """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each linear in it."""
+    """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each
+    linear in it."""
 
     def __init__(self, problem, coordinates, apply_load):
         self.problem, self.coordinates, self.apply_load = problem, coordinates, apply_load
@@ -43,7 +45,8 @@ class BodySystem:
         self.apply_load(value)
 
     def steer(self, apply_load, load):
-        """From here on the load is what `apply_load` sets, and begins at `load`; what was set before stays."""
+        """From here on the load is what `apply_load` sets, and begins at `load`; what was set before
+        stays."""
         self.apply_load, self.load = apply_load, load
 
     def at_supports(self, state):
@@ -68,7 +71,9 @@ class BodySystem:
         self.solver.factorise()
         self._rotation_then = self._rotations()
         contact = self.problem.contact
-        self._update = ContactUpdate(contact.stiffnesses(factorised=True) if contact else {}, MOST_TOUCHES, self.comm.allreduce)
+        self._update = ContactUpdate(
+            contact.stiffnesses(factorised=True) if contact else {}, MOST_TOUCHES, self.comm.allreduce
+        )
 
     @property
     def overreach(self):
@@ -77,7 +82,11 @@ class BodySystem:
     def renew(self):
         """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
         contact = self.problem.contact
-        return self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns) if contact else False
+        return (
+            self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns)
+            if contact
+            else False
+        )
 
     def _solve_columns(self, right):
         return np.column_stack([self._solve(column) for column in right.T])
@@ -92,8 +101,8 @@ class BodySystem:
     def _solve(self, right):
         """(owned dofs,) approximation of K^-1 right with the factorised tangent.
 
-        The factorised tangent is turned with the body: a rigidly rotated part has the tangent R K R^T, so a lagged
-        one serves as long as the *strains* have not changed much, whatever the sections' rotations.
+        The factorised tangent is turned with the body: a rigidly rotated part has the tangent R K R^T, so a
+        lagged one serves as long as the *strains* have not changed much, whatever the sections' rotations.
         """
         dofs = self._owned_displacements
         turn = np.einsum("nij,nkj->nik", self._rotations(), self._rotation_then)[: len(dofs)]
@@ -105,7 +114,8 @@ class BodySystem:
 
     @property
     def unstable(self):
-        """Directions in which the factorised state is unstable at fixed loads; None when the matrix is unsymmetric."""
+        """Directions in which the factorised state is unstable at fixed loads; None when the matrix is
+        unsymmetric."""
         if not self.factorisations:
             return 0  # at rest
         negative = self.solver.negative_pivots
@@ -117,7 +127,8 @@ class BodySystem:
 
     # ---- geometry of the state space
     def moved(self, state, increment):
-        """State after an increment (owned dofs,): displacement retracted, pressure added, supported values kept."""
+        """State after an increment (owned dofs,): displacement retracted, pressure added, supported values
+        kept."""
         self._spread.x.array[: len(increment)] = increment
         self._spread.x.scatter_forward()
         full = self._spread.x.array

@@ -1,7 +1,9 @@
-"""Contact of the walls that face each other across the gaps of a manipulator: hifi.wall_contact on a distributed body.
+"""Contact of the walls that face each other across the gaps of a manipulator: hifi.wall_contact on a
+distributed body.
 
-Wall nodes are few: every rank knows where they all are, and each computes its share of the gaps. Gaps are seen along the mean
-normal of their walls, whose own motion is left out of the forces: it moves them by the overlap, microns, over the walls' size.
+Wall nodes are few: every rank knows where they all are, and each computes its share of the gaps. Gaps are
+seen along the mean normal of their walls, whose own motion is left out of the forces: it moves them by the
+overlap, microns, over the walls' size.
 """
 
 from functools import cached_property
@@ -17,14 +19,18 @@ from hifi.wall_contact import DEEPEST, mean_normal, touching
 
 
 class BodyContact:
-    """Contact in the gaps of `walls` (hifi.walls.WallDistances); laws, gaps: for each of them its PenaltyLaw and width at rest (mm)."""
+    """Contact in the gaps of `walls` (hifi.walls.WallDistances); laws, gaps: for each of them its PenaltyLaw
+    and width at rest (mm)."""
 
     def __init__(self, problem, walls, laws, gaps):
         self.problem, self.comm, self._facets = problem, problem.mesh.comm, walls.facets
         self._laws, self._gaps = laws, gaps
         index_map, size = problem.space.dofmap.index_map, problem.space.dofmap.index_map_bs
         local = problem.displacement_dofs[self._facets].reshape(-1)
-        dofs = np.asarray(index_map.local_to_global((local // size).astype(np.int32)), np.int64) * size + local % size
+        dofs = (
+            np.asarray(index_map.local_to_global((local // size).astype(np.int32)), np.int64) * size
+            + local % size
+        )
         dofs[np.isin(local, problem.fixed_dofs)] = -1
         first, last = (size * i for i in index_map.local_range)
         self._owned, self._size = slice(first, last), size * index_map.size_global
@@ -33,7 +39,11 @@ class BodyContact:
         self._areas = self._all(surface.reference_areas(problem, self._facets))
         # a gap is computed by one rank
         mine = range(self.comm.rank, len(laws), self.comm.size)
-        self._sides = [(2 * g + i, np.flatnonzero(wall == 2 * g + i), np.flatnonzero(wall == 2 * g + 1 - i)) for g in mine for i in (0, 1)]
+        self._sides = [
+            (2 * g + i, np.flatnonzero(wall == 2 * g + i), np.flatnonzero(wall == 2 * g + 1 - i))
+            for g in mine
+            for i in (0, 1)
+        ]
         self._sides_in_touch = TouchingSides()
         #: see hifi.newton
         self.overreach = 0.0
@@ -47,9 +57,17 @@ class BodyContact:
         found = []
         for number, own, other in self._sides:
             direction = mean_normal(x[own]) - mean_normal(x[other])
-            t = touching(x[own], self._areas[own], x[other], direction / np.linalg.norm(direction), self._laws[number // 2])
+            t = touching(
+                x[own],
+                self._areas[own],
+                x[other],
+                direction / np.linalg.norm(direction),
+                self._laws[number // 2],
+            )
             if t is not None:
-                dofs = np.concatenate([self._dofs[own[t.facet]], self._dofs[other[t.other]]], axis=1).reshape(-1, 36)
+                dofs = np.concatenate([self._dofs[own[t.facet]], self._dofs[other[t.other]]], axis=1).reshape(
+                    -1, 36
+                )
                 found.append(_Side(number, t, dofs, self._size))
         return found
 
@@ -61,18 +79,24 @@ class BodyContact:
     def residual(self):
         """(owned dofs,) how the energy stored in overlaps changes with the dofs."""
         self._sides_in_touch.now, zero = self._touching(), sp.csr_matrix((self._size, 1))
-        deep = [(s.touching.overlap.max() + self._laws[s.number // 2].onset) / self._gaps[s.number // 2] for s in self._sides_in_touch.now]
+        deep = [
+            (s.touching.overlap.max() + self._laws[s.number // 2].onset) / self._gaps[s.number // 2]
+            for s in self._sides_in_touch.now
+        ]
         self.overreach = self.comm.allreduce(max(deep, default=0.0), op=MPI.MAX) / DEEPEST
         if not self.overreach:
             return np.zeros(self._owned.stop - self._owned.start)
         return self._sum([zero, *(s.forces() for s in self._sides_in_touch.now)]).toarray()[:, 0]
 
     def add_tangent(self, matrix):
-        """Add the second derivatives of the energy to a PETSc matrix of the mixed space, whose pattern grows; collective."""
+        """Add the second derivatives of the energy to a PETSc matrix of the mixed space, whose pattern grows;
+        collective."""
         self._sides_in_touch.then = self._touching()
         if not self.comm.allreduce(len(self._sides_in_touch.then)):
             return
-        rows = self._sum([sp.csr_matrix((self._size, self._size)), *(s.tangent() for s in self._sides_in_touch.then)])
+        rows = self._sum(
+            [sp.csr_matrix((self._size, self._size)), *(s.tangent() for s in self._sides_in_touch.then)]
+        )
         owned = self._owned.stop - self._owned.start
         both = ((owned, self._size), (owned, self._size))
         contact = PETSc.Mat().createAIJ(both, csr=(rows.indptr, rows.indices, rows.data), comm=self.comm)
@@ -86,7 +110,9 @@ class BodyContact:
 
     def gradients(self, points):
         """(m, owned dofs): how the gaps of points change."""
-        return sum(self.comm.allgather(self._sides_in_touch.gap_gradients(points, self._size)))[:, self._owned].toarray()
+        return sum(self.comm.allgather(self._sides_in_touch.gap_gradients(points, self._size)))[
+            :, self._owned
+        ].toarray()
 
     def forces(self):
         """(gaps, 3) N at the last residual, on all ranks: of each gap's first wall on the second."""
@@ -114,13 +140,17 @@ class _Side:
         """Sparse (points, dofs): first derivatives of the gaps."""
         t, dofs = self.touching, self._dofs[self._kept]
         points = np.broadcast_to(t.point[:, None], self._dofs.shape)[self._kept]
-        return sp.coo_matrix((t.gradient.reshape(-1, 36)[self._kept], (points, dofs)), shape=(len(t.area), self._size)).tocsr()
+        return sp.coo_matrix(
+            (t.gradient.reshape(-1, 36)[self._kept], (points, dofs)), shape=(len(t.area), self._size)
+        ).tocsr()
 
     def tangent(self):
         """Sparse (dofs, dofs)."""
         t, both = self.touching, self._kept[:, :, None] & self._kept[:, None, :]
         bend = -t.push[:, None, None] * t.bend
-        places = [np.broadcast_to(d, both.shape)[both] for d in (self._dofs[:, :, None], self._dofs[:, None, :])]
+        places = [
+            np.broadcast_to(d, both.shape)[both] for d in (self._dofs[:, :, None], self._dofs[:, None, :])
+        ]
         bend = sp.coo_matrix((bend[both], places), shape=(self._size, self._size)).tocsr()
         gradient = self.gap_gradients
         return bend + gradient.T @ sp.diags(t.area * t.slope) @ gradient

@@ -1,4 +1,5 @@
-"""`pneunet campaign`: cells of both kinds over a space-filling sample of designs, gathered into the data set of the rod law."""
+"""`pneunet campaign`: cells of both kinds over a space-filling sample of designs, gathered into the data set
+of the rod law."""
 
 import json
 import time
@@ -24,17 +25,23 @@ from hifi.cases import STATUSES, run_cases
 DATA, SHEET = "cells.npz", "cells.md"
 #: s between two writings of the data set while it grows
 PAUSE = 60.0
-#: strains that the body's half turns forbid over all, above which a case is not accepted: its mesh is too coarse
+#: strains that the body's half turns forbid over all, above which a case is not accepted: its mesh is too
+#: coarse
 LARGEST_SYMMETRY_DEFECT = 0.02
 
 
 def run_campaign(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False, extend=None):
-    """Compute the cases of CAMPAIGN.toml that are not finished in `directory`; collective. Returns the CellData.
+    """Compute the cases of CAMPAIGN.toml that are not finished in `directory`; collective. Returns the
+    CellData.
 
-    extend: a data set whose cases are taken over as they are. directory gets cells.npz and its data sheet cells.md, rewritten while
-    it grows, run.json and cases/NAME.
+    extend: a data set whose cases are taken over as they are. directory gets cells.npz and its data sheet
+    cells.md, rewritten while it grows, run.json and cases/NAME.
     """
-    say, directory, started = say if comm.rank == 0 else (lambda text: None), Path(directory), time.perf_counter()
+    say, directory, started = (
+        say if comm.rank == 0 else (lambda text: None),
+        Path(directory),
+        time.perf_counter(),
+    )
     campaign = on_rank_0(comm, lambda: read_campaign(path))
     known = on_rank_0(comm, lambda: taken_over(campaign, extend)) if extend else Known()
     on_rank_0(comm, lambda: output_directory(directory) and None)
@@ -65,22 +72,30 @@ class Gathering:
             self.write()
 
     def write(self):
-        """Write data set and data sheet of what is known; returns the CellData. InputError when that cannot be written."""
+        """Write data set and data sheet of what is known; returns the CellData. InputError when that cannot
+        be written."""
         data = self.data()
         try:
             write_dataset(self.directory / DATA, data)
             write_text(self.directory / SHEET, datasheet(data))
         except OSError as error:
-            raise InputError(f"{self.directory}: cannot be written to ({error.strerror or error}): make room there") from None
+            raise InputError(
+                f"{self.directory}: cannot be written to ({error.strerror or error}): make room there"
+            ) from None
         self.written = time.monotonic()
         return data
 
     def finish(self, ranks, seconds, say):
         data = self.write()
         counts = Counter(record["status"] for record in self.records.values())
-        write_record(self.directory, campaign=self.campaign.table, cases=counts, ranks=ranks, wall_seconds=seconds)
+        write_record(
+            self.directory, campaign=self.campaign.table, cases=counts, ranks=ranks, wall_seconds=seconds
+        )
         say(", ".join(f"{number} {status}" for status, number in counts.items()))
-        say(f"{len(data.kind)} cases, {data.accepted.mean():.1%} accepted, {len(data.case)} states in {self.directory / DATA}; {SHEET}")
+        say(
+            f"{len(data.kind)} cases, {data.accepted.mean():.1%} accepted, {len(data.case)} states in"
+            f" {self.directory / DATA}; {SHEET}"
+        )
         return data
 
     def data(self):
@@ -114,16 +129,25 @@ class Gathering:
             "campaign": c.table,
             "ranges": c.ranges,
             "largest_symmetry_defect": LARGEST_SYMMETRY_DEFECT,
-            "revisions": sorted({r["revision"] for r in self.records.values() if "revision" in r} | self.known.revisions or {revision()}),
+            "revisions": sorted(
+                {r["revision"] for r in self.records.values() if "revision" in r} | self.known.revisions
+                or {revision()}
+            ),
         }
-        arrays = {f.name: np.asarray(rows[f.name], f.metadata["type"]).reshape(-1, *f.metadata["shape"]) for f in columns()}
+        arrays = {
+            f.name: np.asarray(rows[f.name], f.metadata["type"]).reshape(-1, *f.metadata["shape"])
+            for f in columns()
+        }
         return CellData(about, **arrays)
 
 
 def _case_row(campaign, design, record):
     result = record["result"] or {}
     mesh = result.get("mesh", {})
-    over_mu = {name: result[name] / MU if result.get(name) is not None else np.nan for name in ("limit_pressure", "first_touch")}
+    over_mu = {
+        name: result[name] / MU if result.get(name) is not None else np.nan
+        for name in ("limit_pressure", "first_touch")
+    }
     return {
         "kind": campaign.kinds.index(design.kind),
         "design": design.index,
@@ -160,7 +184,9 @@ def _state_row(segment, state):
         "wall_distance": np.nan if wall is None else wall / length,
         "contact": state["contact"],
         "strain_slopes": _slopes(state.get("strain_slopes"), lambda a: a * scale, 6),
-        "stiffness_slopes": _slopes(state.get("stiffness_slopes"), lambda a: (a / np.outer(scale, scale) / force)[:, *UPPER], 21),
+        "stiffness_slopes": _slopes(
+            state.get("stiffness_slopes"), lambda a: (a / np.outer(scale, scale) / force)[:, *UPPER], 21
+        ),
     }
 
 

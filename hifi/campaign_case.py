@@ -1,8 +1,10 @@
-"""One case of a campaign: a cell over its range of pressures, free, then at prescribed strains around some of its free states.
+"""One case of a campaign: a cell over its range of pressures, free, then at prescribed strains around some of
+its free states.
 
-The range is found first: by the cavity's volume the path is walked until the pressure asked for or a limit point of it. The
-states at the levels are then corrected from interpolations of that path, at fractions of the top pressure; beyond a share of the
-limit load nothing is recorded. Walls that touch are held apart. Everything is in mm and MPa with mu = 1 MPa.
+The range is found first: by the cavity's volume the path is walked until the pressure asked for or a limit
+point of it. The states at the levels are then corrected from interpolations of that path, at fractions of the
+top pressure; beyond a share of the limit load nothing is recorded. Walls that touch are held apart.
+Everything is in mm and MPa with mu = 1 MPa.
 """
 
 import json
@@ -45,16 +47,20 @@ class _Enough(Exception):
 
 
 def solve_campaign_case(inputs, directory):
-    """Case of hifi.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share", "prescribed",
-    "slopes": whether free states are differentiated by the shape}.
+    """Case of hifi.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share",
+    "prescribed", "slopes": whether free states are differentiated by the shape}.
 
-    directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where there was none),
-    top pressure, first touch of walls, why prescribed states are missing, CPU time. ConvergenceError when the free path ends
-    before its top pressure.
+    directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where
+    there was none), top pressure, first touch of walls, why prescribed states are missing, CPU time.
+    ConvergenceError when the free path ends before its top pressure.
     """
-    segment = segment_from_table(inputs["segment"], "segment", material_from_table(inputs["material"], "material"))
+    segment = segment_from_table(
+        inputs["segment"], "segment", material_from_table(inputs["material"], "material")
+    )
     path = directory / "cell.msh"
-    mesh = mesh_cell(segment, path=path, **{key.removesuffix("_mm"): value for key, value in inputs["mesh"].items()})
+    mesh = mesh_cell(
+        segment, path=path, **{key.removesuffix("_mm"): value for key, value in inputs["mesh"].items()}
+    )
     sampler = Sampler(CellProblem(segment, path, contact=WallPenalty()), directory, inputs["slopes"])
     path.unlink()
     mesh["unknowns"] = sampler.problem.unknowns
@@ -87,9 +93,15 @@ class Sampler:
         self.states = []  # what states.json says
 
     def scout(self, top, share):
-        """(top pressure, limit pressure or None), MPa: `top`, or `share` of the limit load where that is less."""
+        """(top pressure, limit pressure or None), MPa: `top`, or `share` of the limit load where that is
+        less."""
         system, limit = self.system, None
-        path = EquilibriumPath(system, VolumeControl(), replace(self.options, relative_tolerance=SCOUT_TOLERANCE), system.volume())
+        path = EquilibriumPath(
+            system,
+            VolumeControl(),
+            replace(self.options, relative_tolerance=SCOUT_TOLERANCE),
+            system.volume(),
+        )
         rest = path.parameter
         self.walked = [self._walked(path)]
 
@@ -99,7 +111,9 @@ class Sampler:
                 raise _Enough
 
         try:
-            run_steps(path, FURTHEST * rest, StepSize(FIRST * rest, 1e-3 * FIRST * rest, LARGEST * rest), keep)
+            run_steps(
+                path, FURTHEST * rest, StepSize(FIRST * rest, 1e-3 * FIRST * rest, LARGEST * rest), keep
+            )
         except _Enough:
             pass
         except ConvergenceError:
@@ -177,17 +191,24 @@ class Sampler:
         if not self.slopes:
             return {}
         strains, stiffness = self.slopes.of(system, stiffness=number % STIFFNESS_SLOPES_EVERY == 0)
-        return {"strain_slopes": strains.tolist()} | ({} if stiffness is None else {"stiffness_slopes": stiffness.tolist()})
+        return {"strain_slopes": strains.tolist()} | (
+            {} if stiffness is None else {"stiffness_slopes": stiffness.tolist()}
+        )
 
     def prescribed(self, wanted):
-        """Record the states of `wanted` ([{"level", "amplitude", "direction"}]); returns why some are missing (n,) texts."""
+        """Record the states of `wanted` ([{"level", "amplitude", "direction"}]); returns why some are missing
+        (n,) texts."""
         missing = []
         for w in wanted:
             index = max(1, round(w["level"] * (len(self.kept) - 1)))
             state, array = self.kept[index]
             q = array[-6:]
             try:
-                self._hold(state.pressure, array, prescribed_change(q, state.stiffness, w["amplitude"], w["direction"]))
+                self._hold(
+                    state.pressure,
+                    array,
+                    prescribed_change(q, state.stiffness, w["amplitude"], w["direction"]),
+                )
             except (ConvergenceError, NotConverged) as error:
                 missing.append(str(error))
         return missing
@@ -204,11 +225,14 @@ class Sampler:
 
 
 def first_touch(states):
-    """Pressure (MPa) at which walls touch on the way through the free states (hifi.touch); None where they do not."""
+    """Pressure (MPa) at which walls touch on the way through the free states (hifi.touch); None where they do
+    not."""
     watch, met = TouchWatch(), None
     for s in states:
         if s["kind"] == "free":
-            met = watch.see(Load(s["pressure"]), s["wall_distance"], contact_force=s["contact_force"]).walls_from
+            met = watch.see(
+                Load(s["pressure"]), s["wall_distance"], contact_force=s["contact_force"]
+            ).walls_from
     return met and met.pressure
 
 

@@ -11,11 +11,14 @@ from hifi.materials import energy_density
 
 
 class StoredEnergy:
-    """Everything in the cell's potential but -P V: N mm per pitch. Along free states its change is the integral of P dV."""
+    """Everything in the cell's potential but -P V: N mm per pitch. Along free states its change is the
+    integral of P dV."""
 
     def __init__(self, problem):
         mesh, material, F = problem.mesh, problem.segment.material, problem.deformation_gradient
-        dx = ufl.Measure("dx", domain=mesh, subdomain_data=problem.cell_tags, metadata={"quadrature_degree": DEGREE})
+        dx = ufl.Measure(
+            "dx", domain=mesh, subdomain_data=problem.cell_tags, metadata={"quadrature_degree": DEGREE}
+        )
         _, p = ufl.split(problem.state)
         air = AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * ufl.det(F))
         self._contact = problem.contact

@@ -1,4 +1,5 @@
-"""A campaign that goes on from a data set: its cases are taken over as they are, whatever became of the folders that they came from."""
+"""A campaign that goes on from a data set: its cases are taken over as they are, whatever became of the
+folders that they came from."""
 
 import json
 from dataclasses import dataclass, field
@@ -12,14 +13,16 @@ from hifi.cases import STATUSES
 
 @dataclass(frozen=True)
 class Known:
-    """cases: {name of the case: (row of the case, rows of its states (dicts), reason)}; revisions: of the code that computed them."""
+    """cases: {name of the case: (row of the case, rows of its states (dicts), reason)}; revisions: of the
+    code that computed them."""
 
     cases: dict = field(default_factory=dict)
     revisions: frozenset = frozenset()
 
 
 def taken_over(campaign, path):
-    """What the data set at `path` knows of a Campaign's cases, found by kind, index and mesh. InputError when its sample is another."""
+    """What the data set at `path` knows of a Campaign's cases, found by kind, index and mesh. InputError when
+    its sample is another."""
     data = read_dataset(path)
     about = data.about
     theirs = {**about["campaign"], "ranges": about["ranges"]}
@@ -29,7 +32,10 @@ def taken_over(campaign, path):
         del asked["edge_ranges"]
     for key, value in json.loads(json.dumps(asked)).items():
         if theirs.get(key) != value:
-            raise InputError(f"{path}: its sample has {key} = {theirs.get(key)}, the campaign's {value}: extend it with the same")
+            raise InputError(
+                f"{path}: its sample has {key} = {theirs.get(key)}, the campaign's {value}: extend it with"
+                " the same"
+            )
     meshes, cases = {mesh["name"]: mesh for mesh in about["meshes"]}, {}
     places = zip(data.kind.tolist(), data.design.tolist(), data.mesh.tolist())
     rows = {(about["kinds"][k], d, about["meshes"][m]["name"]): row for row, (k, d, m) in enumerate(places)}
@@ -38,7 +44,10 @@ def taken_over(campaign, path):
         if row is None:
             continue
         if meshes[d.mesh.name] != {"name": d.mesh.name, **d.mesh.settings}:
-            raise InputError(f"{path}: its mesh is {meshes[d.mesh.name]}, the campaign's {d.mesh.settings}: extend it with the same")
+            raise InputError(
+                f"{path}: its mesh is {meshes[d.mesh.name]}, the campaign's {d.mesh.settings}: extend it with"
+                " the same"
+            )
         case = _row(data, "cases", row) | {
             "kind": campaign.kinds.index(d.kind),
             "mesh": campaign.meshes.index(d.mesh),

@@ -1,12 +1,15 @@
-"""The designs of a campaign: points of a scrambled Sobol sequence in a box of dimensions, and the strains prescribed around them.
+"""The designs of a campaign: points of a scrambled Sobol sequence in a box of dimensions, and the strains
+prescribed around them.
 
-A design is known by kind and index: the sequence is the same however many designs are asked for, so more designs keep the first
-ones. Held-out designs, on which a law is judged and never trained, are every n-th index. Near the edges of the box a law has neighbours
-on one side only, and in ten dimensions most of the box is near an edge: edge designs, another sequence, are crowded towards them.
-Dimensions that users seldom change apart are tied, which leaves fewer directions to fill:
+A design is known by kind and index: the sequence is the same however many designs are asked for, so more
+designs keep the first ones. Held-out designs, on which a law is judged and never trained, are every n-th
+index. Near the edges of the box a law has neighbours on one side only, and in ten dimensions most of the box
+is near an edge: edge designs, another sequence, are crowded towards them. Dimensions that users seldom change
+apart are tied, which leaves fewer directions to fill:
 - the side wall is as thick as the top wall, and in one-sided segments so is the roof of the channel;
-- the cavity's floor lies at the channel's top in one-sided segments; in twisting ones anywhere between axis and channel's top.
-Angles above 90 degrees are mirror images. The material is neo-Hookean with mu = 1 MPa: only P/mu counts.
+- the cavity's floor lies at the channel's top in one-sided segments; in twisting ones anywhere between axis
+and channel's top. Angles above 90 degrees are mirror images. The material is neo-Hookean with mu = 1 MPa:
+only P/mu counts.
 """
 
 from dataclasses import dataclass
@@ -43,11 +46,12 @@ PLACES = 16
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A state at prescribed strains around the free ones q: level (0..1) chooses the pressure; direction (6,), of length 1.
+    """A state at prescribed strains around the free ones q: level (0..1) chooses the pressure; direction
+    (6,), of length 1.
 
-    The strains are q + amplitude sqrt(2 U) K^(-1/2) direction, U the energy of the free twist and curvatures in a rod of
-    stiffness K: amplitudes are in their units, and stiff directions (stretch, shear) are strained less. Without a direction
-    the strains are q_rest + amplitude (q - q_rest).
+    The strains are q + amplitude sqrt(2 U) K^(-1/2) direction, U the energy of the free twist and curvatures
+    in a rod of stiffness K: amplitudes are in their units, and stiff directions (stretch, shear) are strained
+    less. Without a direction the strains are q_rest + amplitude (q - q_rest).
     """
 
     level: float
@@ -56,9 +60,9 @@ class Prescribed:
 
 
 def segments(kind, ranges, count, seed, at_edges=False):
-    """The first `count` Segments of a kind; ranges: {variable: (low, high)} with the keys of RANGES[kind]. at_edges: distributed as
-    Chebyshev's nodes along every variable. (Measured: the 200 of 400 uniform designs that lie furthest out, or half of them those and
-    half any, teach a law as much as all 400.)"""
+    """The first `count` Segments of a kind; ranges: {variable: (low, high)} with the keys of RANGES[kind].
+    at_edges: distributed as Chebyshev's nodes along every variable. (Measured: the 200 of 400 uniform designs
+    that lie furthest out, or half of them those and half any, teach a law as much as all 400.)"""
     names = list(RANGES[kind])
     low, high = np.array([ranges[name] for name in names]).T
     points = _sobol(len(names), count, seed + KINDS.index(kind))
@@ -91,7 +95,8 @@ def _segment(kind, v):
 
 
 def prescribed_states(kind, count, each, seed):
-    """[[Prescribed] of each design]: the free strains' own direction first, extrapolated twofold, then `each` - 1 others."""
+    """[[Prescribed] of each design]: the free strains' own direction first, extrapolated twofold, then `each`
+    - 1 others."""
     points = _sobol(8, count * PLACES, seed + 100 + KINDS.index(kind)).reshape(count, PLACES, 8)
     return [[_prescribed(p, j) for j, p in enumerate(design[:each])] for design in points]
 
@@ -110,5 +115,6 @@ def _sobol(dimension, count, seed):
     import warnings
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # balance of counts that are no power of two: the sequence is to be extended
+        # balance of counts that are no power of two: the sequence is to be extended
+        warnings.simplefilter("ignore", UserWarning)
         return qmc.Sobol(dimension, scramble=True, seed=seed).random(count)

@@ -16,17 +16,26 @@ FUNCTION = "hifi.campaign_case:solve_campaign_case"
 DEFAULT_TIME = 3600.0
 #: index of the first edge design, and what their seed is more: both sequences can be extended
 EDGES, EDGE_SEED = 100_000, 200
-KEYS = ("kinds", "designs", "edge_designs", "seed", "held_out_every", "levels", "top_pressure_over_mu", "limit_share")
+KEYS = (
+    "kinds",
+    "designs",
+    "edge_designs",
+    "seed",
+    "held_out_every",
+    "levels",
+    "top_pressure_over_mu",
+    "limit_share",
+)
 KEYS += ("further", "mesh", "ranges", "edge_ranges", "limits")
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """What geometry.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th designs, from the first, are
-    computed on it, and further ones where it is 1.
+    """What geometry.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th
+    designs, from the first, are computed on it, and further ones where it is 1.
 
-    prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free states of designs that
-    are not held out are differentiated by the shape.
+    prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free
+    states of designs that are not held out are differentiated by the shape.
     """
 
     name: str
@@ -55,7 +64,8 @@ class Design:
 
 @dataclass(frozen=True)
 class Campaign:
-    """designs in the order of computing: by index, so that a campaign that is ended half way is a smaller one."""
+    """designs in the order of computing: by index, so that a campaign that is ended half way is a smaller
+    one."""
 
     designs: tuple
     kinds: tuple
@@ -96,9 +106,13 @@ def read_campaign(path):
     further = _further(data, kinds, count, where)
     designs, places = [], max(m.prescribed for m in meshes)
     for kind in kinds:
-        # (name of the ranges, those, places in the sequence, index of the first, seed, whether they are edge designs)
+        # (name of the ranges, those, places in the sequence, index of the first, seed, whether they are edge
+        # designs)
         own = [*range(count), *further[kind]]
-        sequences = (("ranges", ranges, own, 0, seed, False), ("edge_ranges", edge_ranges, range(edges), EDGES, seed + EDGE_SEED, True))
+        sequences = (
+            ("ranges", ranges, own, 0, seed, False),
+            ("edge_ranges", edge_ranges, range(edges), EDGES, seed + EDGE_SEED, True),
+        )
         for name, box, positions, first, start, at_edges in sequences:
             size = max(positions, default=-1) + 1
             try:
@@ -112,23 +126,47 @@ def read_campaign(path):
                 for mesh in meshes:
                     if mesh.every == 1 or index % mesh.every == 0 and index < count:
                         settings = common | {"slopes": mesh.slopes and not judge}
-                        case = _case(kind, index, mesh, bodies[position], states[position][: mesh.prescribed_of(index)], settings)
+                        case = _case(
+                            kind,
+                            index,
+                            mesh,
+                            bodies[position],
+                            states[position][: mesh.prescribed_of(index)],
+                            settings,
+                        )
                         designs.append(Design(kind, index, mesh, judge, bodies[position], case))
     designs.sort(key=lambda d: d.index)
-    table = {"designs": count, "edge_designs": edges, "seed": seed, "held_out_every": held_out_every, **common}
+    table = {
+        "designs": count,
+        "edge_designs": edges,
+        "seed": seed,
+        "held_out_every": held_out_every,
+        **common,
+    }
     table["further"] = {kind: len(indices) for kind, indices in further.items()}
-    table["edge_ranges"] = {k: {name: r for name, r in edge_ranges[k].items() if r != ranges[k][name]} for k in kinds}
+    table["edge_ranges"] = {
+        k: {name: r for name, r in edge_ranges[k].items() if r != ranges[k][name]} for k in kinds
+    }
     return Campaign(
-        tuple(designs), tuple(kinds), meshes, ranges, Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")), table
+        tuple(designs),
+        tuple(kinds),
+        meshes,
+        ranges,
+        Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")),
+        table,
     )
 
 
 def on_offer(campaign, kind, count):
-    """[(index, Segment)] of the next `count` designs of the sample after a Campaign's that could be further ones: neither held out nor
-    among its own."""
+    """[(index, Segment)] of the next `count` designs of the sample after a Campaign's that could be further
+    ones: neither held out nor among its own."""
     start, known = campaign.table["designs"], {d.index for d in campaign.designs if d.kind == kind}
     bodies = segments(kind, campaign.ranges[kind], start + count, campaign.table["seed"])
-    free = (i for i in range(start, start + count) if i not in known and not is_held_out(i, campaign.table["held_out_every"]))
+    free = (
+        i
+        for i in range(start, start + count)
+        if i not in known and not is_held_out(i, campaign.table["held_out_every"])
+    )
     return [(i, bodies[i]) for i in free]
 
 
@@ -155,7 +193,11 @@ def _meshes(rows, where):
     meshes = []
     for i, row in enumerate(rows, start=1):
         at = f"{where} [[mesh]] {i}"
-        refuse_unknown(row, ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every", "slopes"], at)
+        refuse_unknown(
+            row,
+            ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every", "slopes"],
+            at,
+        )
         for key in ("name", "mesh_size_mm"):
             if key not in row:
                 raise InputError(f"{at}: key '{key}' is missing")
@@ -166,7 +208,11 @@ def _meshes(rows, where):
                 if not 0.02 <= row[key] <= 20:
                     raise InputError(f"{at}: {key} = {row[key]:g} must lie in 0.02..20")
         counts = []
-        for key, default, low, high in (("every", 1, 1, 10_000), ("prescribed", 0, 0, PLACES), ("prescribed_every", 1, 1, 10_000)):
+        for key, default, low, high in (
+            ("every", 1, 1, 10_000),
+            ("prescribed", 0, 0, PLACES),
+            ("prescribed_every", 1, 1, 10_000),
+        ):
             counts.append(number(row.get(key, default), key, at, integer=True))
             if not low <= counts[-1] <= high:
                 raise InputError(f"{at}: {key} = {counts[-1]} must lie in {low}..{high}")
@@ -185,9 +231,13 @@ def _further(data, kinds, count, where):
     table = as_table(data.get("further", {}), where)
     refuse_unknown(table, kinds, where)
     for kind, indices in table.items():
-        whole = isinstance(indices, list) and all(isinstance(i, int) and not isinstance(i, bool) for i in indices)
+        whole = isinstance(indices, list) and all(
+            isinstance(i, int) and not isinstance(i, bool) for i in indices
+        )
         if not whole or len(set(indices)) < len(indices) or any(not count <= i < EDGES for i in indices):
-            raise InputError(f"{where}: {kind} must be a list of different whole numbers in {count}..{EDGES - 1}")
+            raise InputError(
+                f"{where}: {kind} must be a list of different whole numbers in {count}..{EDGES - 1}"
+            )
     return {kind: table.get(kind, []) for kind in kinds}
 
 

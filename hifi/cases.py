@@ -1,9 +1,11 @@
-"""Many independent cases on MPI ranks, each in a process of its own: studies and campaigns run on this, whatever a case is.
+"""Many independent cases on MPI ranks, each in a process of its own: studies and campaigns run on this,
+whatever a case is.
 
-A case is a function by its import name and its inputs as JSON. It runs alone in a child process with a time and a memory limit,
-in a folder that is named by function and inputs and gets its name when the case is complete, with record.json in it: so a case
-that is on disk is finished, and a run that was killed at any moment goes on where it was. A case that raises, crashes, hangs or
-eats memory is recorded like any other and stops nothing. Ranks get cases from mpi4py.futures; its manager takes rank 0.
+A case is a function by its import name and its inputs as JSON. It runs alone in a child process with a time
+and a memory limit, in a folder that is named by function and inputs and gets its name when the case is
+complete, with record.json in it: so a case that is on disk is finished, and a run that was killed at any
+moment goes on where it was. A case that raises, crashes, hangs or eats memory is recorded like any other and
+stops nothing. Ranks get cases from mpi4py.futures; its manager takes rank 0.
 """
 
 import fcntl
@@ -43,9 +45,11 @@ LOCK_SECONDS = 5
 
 @dataclass(frozen=True)
 class Case:
-    """`function` ("module:name") will be called as function(inputs, directory) and returns what JSON can hold, or None.
+    """`function` ("module:name") will be called as function(inputs, directory) and returns what JSON can
+    hold, or None.
 
-    It raises ConvergenceError where its path ends, InputError on inputs it refuses. label: what progress calls it.
+    It raises ConvergenceError where its path ends, InputError on inputs it refuses. label: what progress
+    calls it.
     """
 
     function: str
@@ -59,14 +63,24 @@ class Case:
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def run_cases(cases, directory, limits=None, comm=MPI.COMM_WORLD, say=print, on_record=lambda case, record: None, retry=False):
-    """Run what is not finished of `cases` in directory/NAME; collective. Returns the records, in order, on rank 0, else [].
+def run_cases(
+    cases,
+    directory,
+    limits=None,
+    comm=MPI.COMM_WORLD,
+    say=print,
+    on_record=lambda case, record: None,
+    retry=False,
+):
+    """Run what is not finished of `cases` in directory/NAME; collective. Returns the records, in order, on
+    rank 0, else [].
 
-    A record: {"function", "inputs", "status", "reason", "result", "seconds", "peak_memory_MB", ...}, status one of "done",
-    "stopped" (ConvergenceError), "refused" (InputError), "error", "crashed", "out of time", "out of memory". limits: of one
-    case; without a memory limit the workers share their machine's memory. on_record(case, record) is called on rank 0 as
-    each comes to be known, those on disk first. retry: cases that did not end by themselves are computed again. With more
-    than one rank, rank 0 hands out and computes nothing. InputError, on all ranks, when the folder is not to be had.
+    A record: {"function", "inputs", "status", "reason", "result", "seconds", "peak_memory_MB", ...}, status
+    one of "done", "stopped" (ConvergenceError), "refused" (InputError), "error", "crashed", "out of time",
+    "out of memory". limits: of one case; without a memory limit the workers share their machine's memory.
+    on_record(case, record) is called on rank 0 as each comes to be known, those on disk first. retry: cases
+    that did not end by themselves are computed again. With more than one rank, rank 0 hands out and computes
+    nothing. InputError, on all ranks, when the folder is not to be had.
     """
     directory = Path(directory)
     say = say if comm.rank == 0 else (lambda text: None)
@@ -74,7 +88,12 @@ def run_cases(cases, directory, limits=None, comm=MPI.COMM_WORLD, say=print, on_
     records, failure = {}, None
     with _locked(comm, directory):
         todo = on_rank_0(comm, lambda: _unfinished(cases, directory, retry, records, on_record, say))
-        work = partial(run_case, directory=directory, limits=limits, version=comm.bcast(revision() if comm.rank == 0 else None))
+        work = partial(
+            run_case,
+            directory=directory,
+            limits=limits,
+            version=comm.bcast(revision() if comm.rank == 0 else None),
+        )
         progress = _Progress(len(todo), say)
 
         def take(finished):
@@ -110,39 +129,61 @@ def _distribute(work, todo, comm, take):
 
 
 def run_case(case, directory, limits, version="unknown"):
-    """(case, record) of one case, run in a child process; directory/NAME is there, complete, when it returns."""
+    """(case, record) of one case, run in a child process; directory/NAME is there, complete, when it
+    returns."""
     started = time.time()
     try:
         folder = Path(tempfile.mkdtemp(dir=directory, prefix=f".{case.name}-"))
         record = _run_in(folder, case, limits)
-        record |= {"limits": asdict(limits), "host": socket.gethostname(), "revision": version, "started_unix_s": started}
+        record |= {
+            "limits": asdict(limits),
+            "host": socket.gethostname(),
+            "revision": version,
+            "started_unix_s": started,
+        }
         write_text(folder / RECORD, json.dumps(record, indent=1) + "\n")
-        shutil.rmtree(directory / case.name, ignore_errors=True)  # of a run that did not end by itself, or left no record
+        # of a run that did not end by itself, or left no record
+        shutil.rmtree(directory / case.name, ignore_errors=True)
         os.chmod(folder, 0o755)
         os.rename(folder, directory / case.name)
     except OSError as error:  # nothing is on disk: the next run computes it again
         reason = f"could not be started or recorded ({error})"
-        record = _record(case, {"status": CRASHED, "reason": reason, "result": None}, time.time() - started, None)
+        record = _record(
+            case, {"status": CRASHED, "reason": reason, "result": None}, time.time() - started, None
+        )
     return case, record
 
 
 def _record(case, answer, seconds, memory):
-    return {"function": case.function, "inputs": case.inputs, **answer, "seconds": seconds, "peak_memory_MB": memory}
+    return {
+        "function": case.function,
+        "inputs": case.inputs,
+        **answer,
+        "seconds": seconds,
+        "peak_memory_MB": memory,
+    }
 
 
 def _run_in(folder, case, limits):
     """The record of a case whose child works in `folder`."""
-    write_text(folder / "case.json", json.dumps({"function": case.function, "inputs": case.inputs}, default=float))
+    write_text(
+        folder / "case.json", json.dumps({"function": case.function, "inputs": case.inputs}, default=float)
+    )
     source = str(Path(__file__).resolve().parent.parent)  # the child shall run the code that we are
     with own_cache() as cache:
-        environment = {"OMP_NUM_THREADS": "1"} | environment_without_launcher() | {"XDG_CACHE_HOME": str(cache)}
+        environment = (
+            {"OMP_NUM_THREADS": "1"} | environment_without_launcher() | {"XDG_CACHE_HOME": str(cache)}
+        )
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, [source, environment.get("PYTHONPATH")]))
         command = [sys.executable, "-X", "faulthandler", "-m", "hifi.case_process", str(folder.resolve())]
         ended = run_limited(command, limits, folder / "log.txt", environment, folder)
     try:
         answer = json.loads((folder / "answer.json").read_text())
     except FileNotFoundError:
-        answer = {**_how_it_failed(ended, limits, (folder / "log.txt").read_text(errors="replace")), "result": None}
+        answer = {
+            **_how_it_failed(ended, limits, (folder / "log.txt").read_text(errors="replace")),
+            "result": None,
+        }
     for name in ("case.json", "answer.json"):
         (folder / name).unlink(missing_ok=True)
     answer["reason"] = answer["reason"].replace(str(folder.resolve()), str(folder.with_name(case.name)))
@@ -202,7 +243,8 @@ def _with_memory(limits, comm):
 
 @contextmanager
 def _locked(comm, directory):
-    """The folder, made if need be, for this run alone: rank 0 holds a lock that falls with it, however it ends."""
+    """The folder, made if need be, for this run alone: rank 0 holds a lock that falls with it, however it
+    ends."""
 
     def lock():
         stream = open(output_directory(directory) / "lock", "w")
@@ -213,7 +255,9 @@ def _locked(comm, directory):
                 return
             except BlockingIOError:
                 time.sleep(0.1)
-        raise InputError(f"{directory}: another run is at work in it: wait for that, or choose another folder with -o")
+        raise InputError(
+            f"{directory}: another run is at work in it: wait for that, or choose another folder with -o"
+        )
 
     held = []
     on_rank_0(comm, lock)
@@ -236,6 +280,6 @@ class _Progress:
         memory = f", {record['peak_memory_MB']:.0f} MB" if record["peak_memory_MB"] else ""
         reason = f": {record['reason']}" if record["reason"] else ""
         self.say(
-            f"{self.done:{len(str(self.total))}d}/{self.total}  {case.label or case.name}: {record['status']} in "
-            f"{record['seconds']:.1f} s{memory}{reason}; ETA {left:.0f} s"
+            f"{self.done:{len(str(self.total))}d}/{self.total}  {case.label or case.name}: {record['status']}"
+            f" in {record['seconds']:.1f} s{memory}{reason}; ETA {left:.0f} s"
         )

@@ -1,12 +1,13 @@
 """The unit cell of a long uniform segment: one pitch under screw periodicity.
 
-A long segment deforms as x(X) = c(s) + Q(s) y(X), s = X1, with c' = Q e, Q' = Q hat(k) and y periodic over one pitch.
-With y = (0, X2, X3) + u the deformation gradient is, but for the rotation Q,
+A long segment deforms as x(X) = c(s) + Q(s) y(X), s = X1, with c' = Q e, Q' = Q hat(k) and y periodic over
+one pitch. With y = (0, X2, X3) + u the deformation gradient is, but for the rotation Q,
     F = grad u + diag(0, 1, 1) + (e + k x y) (x) E1,
-so the energy of a pitch is a function of the periodic u, the pressure field and the six numbers (e, k). The gauge, mean
-displacement and mean rotation of the channel's wall zero, makes (e, k) the strains of the section frame on the channel
-axis. The air is meshed too: its energy -P J carries wall pressure, cap thrust and end moments in one bulk term; a little
-stiffness keeps its inner nodes in place. Serial: designs are spread over ranks, not cells.
+so the energy of a pitch is a function of the periodic u, the pressure field and the six numbers (e, k). The
+gauge, mean displacement and mean rotation of the channel's wall zero, makes (e, k) the strains of the section
+frame on the channel axis. The air is meshed too: its energy -P J carries wall pressure, cap thrust and end
+moments in one bulk term; a little stiffness keeps its inner nodes in place. Serial: designs are spread over
+ranks, not cells.
 """
 
 import numpy as np
@@ -36,18 +37,24 @@ _PLACED = ("segment", "nodes", "gauge", "gauge_strains", "walls", "contact", "_b
 
 
 class CellProblem:
-    """Unknowns, residual and tangent of the cell of `segment`; mesh: path of geometry.cell.mesh_cell's, or the mesh and its tags.
+    """Unknowns, residual and tangent of the cell of `segment`; mesh: path of geometry.cell.mesh_cell's, or
+    the mesh and its tags.
 
-    Any pitch of the periodic body will do, whatever its cut's place or shape, and any object with a pitch, a width, a material
-    and a layer_material serves as segment. gauge: tags of the facets whose rigid fit is the section frame; centre: X1 (mm)
-    where that frame sits, in the middle of the pitch over which it is fitted. rollers: {facet tag: component of u that is zero}.
-    contact: the hifi.wall_contact.WallPenalty between the walls of the gaps. medium: or a hifi.contact.ThirdMedium that fills the
-    gaps, which must be meshed then; without it, meshed gaps are void.
+    Any pitch of the periodic body will do, whatever its cut's place or shape, and any object with a pitch, a
+    width, a material and a layer_material serves as segment. gauge: tags of the facets whose rigid fit is the
+    section frame; centre: X1 (mm) where that frame sits, in the middle of the pitch over which it is fitted.
+    rollers: {facet tag: component of u that is zero}. contact: the hifi.wall_contact.WallPenalty between the
+    walls of the gaps. medium: or a hifi.contact.ThirdMedium that fills the gaps, which must be meshed then;
+    without it, meshed gaps are void.
     """
 
-    def __init__(self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None, medium=None, contact=None):
+    def __init__(
+        self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None, medium=None, contact=None
+    ):
         self.segment, comm, self._gauge_of, self._penalty = segment, MPI.COMM_SELF, (gauge, centre), contact
-        self.mesh, self.cell_tags, self.facet_tags = mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, comm)
+        self.mesh, self.cell_tags, self.facet_tags = (
+            mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, comm)
+        )
         mesh = self.mesh
         self.medium = medium.on(mesh) if medium else None
         self.space = compat.mixed_space(mesh)
@@ -63,7 +70,9 @@ class CellProblem:
         self.nodes = self.displacement_space.tabulate_dof_coordinates()
         self._reduce(rollers or {})
         self._place()
-        self.stretch = PrincipalStretch(self, self.cell_tags.indices[np.isin(self.cell_tags.values, (cad.BODY, cad.LAYER))])
+        self.stretch = PrincipalStretch(
+            self, self.cell_tags.indices[np.isin(self.cell_tags.values, (cad.BODY, cad.LAYER))]
+        )
 
     def _place(self):
         """What depends on where the nodes are."""
@@ -90,14 +99,18 @@ class CellProblem:
 
     def _define_forms(self):
         mesh, material = self.mesh, self.segment.material
-        dx = ufl.Measure("dx", domain=mesh, subdomain_data=self.cell_tags, metadata={"quadrature_degree": DEGREE})
+        dx = ufl.Measure(
+            "dx", domain=mesh, subdomain_data=self.cell_tags, metadata={"quadrature_degree": DEGREE}
+        )
         solid, air = dx(cad.BODY), dx(AIR)
         q = ufl.variable(self.strains)
         u, p = ufl.split(self.state)
         v = ufl.TestFunction(self.space)
         X = ufl.SpatialCoordinate(mesh)
         y = ufl.as_vector((0, X[1], X[2])) + u
-        stretch = ufl.as_vector([q[i] for i in range(3)]) + ufl.cross(ufl.as_vector([q[i] for i in range(3, 6)]), y)
+        stretch = ufl.as_vector([q[i] for i in range(3)]) + ufl.cross(
+            ufl.as_vector([q[i] for i in range(3, 6)]), y
+        )
         grad_y = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]])
         E1 = ufl.unit_vector(0, 3)
         F = grad_y + ufl.outer(stretch, E1)
@@ -105,7 +118,11 @@ class CellProblem:
         J = ufl.det(F)
         energies = (
             (energy_density(mesh, material, F, p), solid),
-            *((energy_density(mesh, m, F, p), dx(cad.LAYER)) for m in [self.segment.layer_material] if m is not None),
+            *(
+                (energy_density(mesh, m, F, p), dx(cad.LAYER))
+                for m in [self.segment.layer_material]
+                if m is not None
+            ),
             (-self.pressure * J + AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * J), air),
         )
         if self.medium:
@@ -113,7 +130,9 @@ class CellProblem:
             k = ufl.as_matrix([[0, -q[5], q[4]], [q[5], 0, -q[3]], [-q[4], q[3], 0]])
             a, b, c = ufl.indices(3)
             kF, ky = k * F, k * grad_y
-            second = ufl.as_tensor(ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c))
+            second = ufl.as_tensor(
+                ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c)
+            )
             energies += ((self.medium.density(F, second, material.mu), dx(GAP)),)
             self._contact = compat.compile_form(ufl.derivative(energies[-1][0] * dx(GAP), self.state, v))
         residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
@@ -131,11 +150,15 @@ class CellProblem:
         self._vector = fem.petsc.create_vector(self._residual)
 
     def _reduce(self, rollers):
-        """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p has -1."""
+        """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p
+        has -1."""
         pitch, n = self.segment.pitch, len(self.state.x.array)
         master = np.arange(n)
         points = self.pressure_space.tabulate_dof_coordinates()
-        for coordinates, dofs in ((self.nodes, self.displacement_dofs), (points, self.pressure_dofs[:, None])):
+        for coordinates, dofs in (
+            (self.nodes, self.displacement_dofs),
+            (points, self.pressure_dofs[:, None]),
+        ):
             first = _same_modulo(coordinates, pitch)
             master[dofs] = dofs[first]
         solid = self.cell_tags.indices[~np.isin(self.cell_tags.values, (AIR, GAP))]
@@ -156,15 +179,19 @@ class CellProblem:
         self.constraints = int(np.count_nonzero(np.isin(kept, self.pressure_dofs)))
 
     def _define_gauge(self, tags, centre):
-        """gauge (unknowns, 6) and gauge_strains (6, 6): the section frame's conditions are linear in u and (e, k).
+        """gauge (unknowns, 6) and gauge_strains (6, 6): the section frame's conditions are linear in u and
+        (e, k).
 
-        Mean displacement (3) and mean rotation (3) of the tagged facets over the pitch around `centre` are zero. Their
-        points also lie along X1, where the shears e2 and e3 displace them sideways by X1 e: a frame fitted over a pitch
-        follows mostly the tangent, and so must the gauge.
+        Mean displacement (3) and mean rotation (3) of the tagged facets over the pitch around `centre` are
+        zero. Their points also lie along X1, where the shears e2 and e3 displace them sideways by X1 e: a
+        frame fitted over a pitch follows mostly the tangent, and so must the gauge.
         """
         facets, pitch = surface.facet_nodes(self, *tags), self.segment.pitch
         # the periodic surface in the window: what is in it of this pitch and of its neighbours
-        windows = [(i * pitch, surface.SlabIntegral(self, facets, *(centre + pitch * (np.array([-0.5, 0.5]) - i)))) for i in (-1, 0, 1)]
+        windows = [
+            (i * pitch, surface.SlabIntegral(self, facets, *(centre + pitch * (np.array([-0.5, 0.5]) - i))))
+            for i in (-1, 0, 1)
+        ]
         area, size = sum(w.area for _, w in windows), self.segment.width
         self.gauge_strains = np.zeros((6, 6))
         gauge = sp.csr_matrix((self.unknowns, 6))
@@ -180,7 +207,9 @@ class CellProblem:
             columns = self.reduced[self.displacement_dofs[integral.nodes]]
             moving = columns >= 0
             for i, row in enumerate(rows):
-                gauge += sp.coo_matrix((row[moving], (columns[moving], np.full(moving.sum(), i))), shape=gauge.shape).tocsr()
+                gauge += sp.coo_matrix(
+                    (row[moving], (columns[moving], np.full(moving.sum(), i))), shape=gauge.shape
+                ).tocsr()
         self.gauge = gauge
 
     def expand(self, values):
@@ -227,7 +256,8 @@ class CellProblem:
         return matrix, mixed + pushed, curvature + screwed
 
     def contact_forces(self):
-        """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their X1."""
+        """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their
+        X1."""
         with self._vector.localForm() as local:
             local.set(0.0)
         fem.petsc.assemble_vector(self._vector, self._contact)
@@ -248,7 +278,8 @@ class CellProblem:
 class _BorderedPattern:
     """Where the entries of a matrix of the mixed space go in that of the unknowns, bordered by the gauge.
 
-    It grows by the entries of walls that touch, and keeps them when they part: a new pattern costs a new analysis.
+    It grows by the entries of walls that touch, and keeps them when they part: a new pattern costs a new
+    analysis.
     """
 
     def __init__(self, matrix, reduced, gauge):
@@ -256,7 +287,11 @@ class _BorderedPattern:
         rows, columns = reduced[np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))], reduced[indices]
         self._keep = np.flatnonzero((rows >= 0) & (columns >= 0))
         border, self._size = gauge.tocoo(), sum(gauge.shape)
-        i, j, corner = border.row.astype(np.int64), border.col + gauge.shape[0], np.arange(gauge.shape[0], self._size)
+        i, j, corner = (
+            border.row.astype(np.int64),
+            border.col + gauge.shape[0],
+            np.arange(gauge.shape[0], self._size),
+        )
         self._border = np.concatenate([border.data, border.data, np.zeros(len(corner))])
         rows = np.concatenate([rows[self._keep], i, j, corner])
         self._known = self._key(rows, np.concatenate([columns[self._keep], j, i, corner]))
@@ -272,7 +307,8 @@ class _BorderedPattern:
         self._indptr = np.searchsorted(self._keys, self._size * np.arange(self._size + 1)).astype(np.int32)
 
     def filled(self, data, rows=(), columns=(), values=()):
-        """CSR matrix of the values `data` of the mixed space's matrix and of entries (row, column, value) of the unknowns.
+        """CSR matrix of the values `data` of the mixed space's matrix and of entries (row, column, value) of
+        the unknowns.
 
         Its `indices` are the same array until the pattern grows.
         """
@@ -287,7 +323,8 @@ class _BorderedPattern:
 
 
 def _same_modulo(points, pitch, tolerance=1e-5):
-    """(n,) index of the first of those points (n, 3) that coincide when X1 is taken modulo the pitch; tolerance in mm."""
+    """(n,) index of the first of those points (n, 3) that coincide when X1 is taken modulo the pitch;
+    tolerance in mm."""
     wrapped = points.copy()
     wrapped[:, 0] = np.mod(points[:, 0], pitch)
     wrapped[wrapped[:, 0] >= pitch, 0] = 0.0

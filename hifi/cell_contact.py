@@ -1,7 +1,9 @@
-"""Contact of a unit cell's walls: hifi.wall_contact between the pieces that the cell's cuts leave, moved by the strains (e, k).
+"""Contact of a unit cell's walls: hifi.wall_contact between the pieces that the cell's cuts leave, moved by
+the strains (e, k).
 
-Each gap is seen from the section frame in its middle, in which a wall's node of local position y at the distance s along the axis
-lies at exp(s (k, e)) y: linear in y, and its derivatives by the strains are exact too (base.left_jacobian).
+Each gap is seen from the section frame in its middle, in which a wall's node of local position y at the
+distance s along the axis lies at exp(s (k, e)) y: linear in y, and its derivatives by the strains are exact
+too (base.left_jacobian).
 """
 
 from dataclasses import replace
@@ -27,14 +29,16 @@ class CellContact:
         self.problem, segment = problem, problem.segment
         self.law = penalty.on(segment.material.mu, segment.gap)
         self._sides, self._sides_in_touch = [], TouchingSides()
-        #: deepest overlap at the last residual, over DEEPEST of the gap; 0 where nothing comes closer than the penalty's onset
+        #: deepest overlap at the last residual, over DEEPEST of the gap; 0 where nothing comes closer than
+        #: the penalty's onset
         self.overreach = 0.0
         for gap in walls.gaps:
             rest = [problem.nodes[f] + np.multiply.outer(s, [[1, 0, 0]]) for f, s in gap]
             middle = np.mean([r[..., 0].mean() for r in rest])
             normal = mean_normal(rest[0]) - mean_normal(rest[1])
             sheets = [
-                _Sheet(f, problem.nodes[f][..., 0] + s[:, None] - middle, surface.reference_areas(problem, f)) for f, s in gap
+                _Sheet(f, problem.nodes[f][..., 0] + s[:, None] - middle, surface.reference_areas(problem, f))
+                for f, s in gap
             ]
             normal /= np.linalg.norm(normal)
             self._sides += [(sheets, normal), (sheets[::-1], -normal)]
@@ -66,12 +70,17 @@ class CellContact:
         return forces[:-6], forces[-6:]
 
     def tangent(self):
-        """((rows, columns, values) in the unknowns, (unknowns, 6), (6, 6)): second derivatives of the energy."""
+        """((rows, columns, values) in the unknowns, (unknowns, 6), (6, 6)): second derivatives of the
+        energy."""
         n, self._sides_in_touch.then = self.problem.unknowns, self._touching()
         total = sp.csr_matrix((n + 6, n + 6))
         for side in self._sides_in_touch.then:
             gradient = side.gap_gradients
-            total = total + side.bend() + gradient.T @ sp.diags(side.touching.area * side.touching.slope) @ gradient
+            total = (
+                total
+                + side.bend()
+                + gradient.T @ sp.diags(side.touching.area * side.touching.slope) @ gradient
+            )
         inner = total[:n, :n].tocoo()
         return (inner.row, inner.col, inner.data), total[:n, n:].toarray(), total[n:, n:].toarray()
 
@@ -94,13 +103,19 @@ class CellContact:
             if pushing.any():
                 d = distances_from(side.places[1], t.position[pushing])
                 c = gaps[gap]
-                gaps[gap] = WallContact(0.0, c.area + t.area[pushing].sum(), np.fmin(c.nearest, d.min()), np.fmax(c.farthest, d.max()))
+                gaps[gap] = WallContact(
+                    0.0,
+                    c.area + t.area[pushing].sum(),
+                    np.fmin(c.nearest, d.min()),
+                    np.fmax(c.farthest, d.max()),
+                )
         forces = np.linalg.norm(totals, axis=1)
         return replace(gaps[forces.argmax()], force=float(forces.max()))
 
 
 class _Sheet:
-    """facets (n, 6) of nodes, s (n, 6) their distances from the middle of the gap along the axis (mm), areas (n,) in mm2."""
+    """facets (n, 6) of nodes, s (n, 6) their distances from the middle of the gap along the axis (mm), areas
+    (n,) in mm2."""
 
     def __init__(self, facets, s, areas):
         self.facets, self.s, self.areas = facets, s, areas
@@ -123,7 +138,8 @@ class _Side:
         self.x = np.concatenate([places[0][t.facet], places[1][t.other]], axis=1)
         columns = problem.reduced[problem.displacement_dofs[nodes]].reshape(len(nodes), 36)
         strains = np.broadcast_to(problem.unknowns + np.array(_ORDER), (len(nodes), 6))
-        #: (n, 42) places of the nodes' unknowns, -1 where held, and of the strains' twist (k, e) behind all unknowns
+        #: (n, 42) places of the nodes' unknowns, -1 where held, and of the strains' twist (k, e) behind all
+        #: unknowns
         self.columns = np.hstack([columns, strains])
         self.kept = self.columns >= 0
         e, k = np.split(problem.strains.value, 2)
@@ -152,18 +168,28 @@ class _Side:
         f, H = t.forces, -t.push[:, None, None] * t.bend
         HD = (H @ D.reshape(pairs, 36, 6)).reshape(pairs, 12, 3, 6)
         H = H.reshape(pairs, 12, 3, 12, 3)
-        local = np.einsum("caji,cajbk,cbkl->caibl", self.rotation, H, self.rotation, optimize=True).reshape(pairs, 36, 36)
+        local = np.einsum("caji,cajbk,cbkl->caibl", self.rotation, H, self.rotation, optimize=True).reshape(
+            pairs, 36, 36
+        )
         # the wall turns under a force that stands still: d(R^T f) = R^T (f x spin)
         turned = np.cross(f[..., None], self._rates[..., :3, :], axisa=-2, axisb=-2, axisc=-2)
         coupling = np.einsum("caji,cajs->cais", self.rotation, HD + turned).reshape(pairs, 36, 6)
         own = np.einsum("cais,cait->cst", D, HD)
         wrench = np.concatenate([np.cross(self.x, f), f], axis=-1)
-        own += np.einsum("ca,cast->cst", self.s**2, self._jacobian.slope(wrench.reshape(-1, 6)).reshape(*self.s.shape, 6, 6))
+        own += np.einsum(
+            "ca,cast->cst",
+            self.s**2,
+            self._jacobian.slope(wrench.reshape(-1, 6)).reshape(*self.s.shape, 6, 6),
+        )
         by_place = np.cross(D, f[..., None], axisa=-2, axisb=-2, axisc=-2)  # d(x x f)
         own += np.einsum("cais,cait->cst", self._rates[..., :3, :], by_place)
-        whole = np.concatenate([np.concatenate([local, coupling], 2), np.concatenate([np.swapaxes(coupling, 1, 2), own], 2)], 1)
+        whole = np.concatenate(
+            [np.concatenate([local, coupling], 2), np.concatenate([np.swapaxes(coupling, 1, 2), own], 2)], 1
+        )
         both = self.kept[:, :, None] & self.kept[:, None, :]
-        places = [np.broadcast_to(c, both.shape)[both] for c in (self.columns[:, :, None], self.columns[:, None, :])]
+        places = [
+            np.broadcast_to(c, both.shape)[both] for c in (self.columns[:, :, None], self.columns[:, None, :])
+        ]
         return sp.coo_matrix((whole[both], places), shape=(self.unknowns + 6,) * 2).tocsr()
 
     @cached_property
@@ -172,4 +198,6 @@ class _Side:
         t, kept = self.touching, self.kept
         points = np.broadcast_to(t.point[:, None], kept.shape)[kept]
         values = self._chained(t.gradient)[kept]
-        return sp.coo_matrix((values, (points, self.columns[kept])), shape=(len(t.area), self.unknowns + 6)).tocsr()
+        return sp.coo_matrix(
+            (values, (points, self.columns[kept])), shape=(len(t.area), self.unknowns + 6)
+        ).tocsr()

@@ -1,4 +1,5 @@
-"""`pneunet cell`: one pitch of a segment from rest to a pressure, free or at prescribed strains, with its rod stiffness."""
+"""`pneunet cell`: one pitch of a segment from rest to a pressure, free or at prescribed strains, with its rod
+stiffness."""
 
 import time
 from dataclasses import replace
@@ -28,17 +29,26 @@ from hifi.wall_picture import draw_cell
 CONTACT_PATIENCE = 10.0
 
 
-def solve_cell(case, mesh_path, on_state=lambda state: None, on_limit_point=lambda point: None, on_touch=lambda pressure: None):
-    """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns (last CellState, mesh facts).
+def solve_cell(
+    case,
+    mesh_path,
+    on_state=lambda state: None,
+    on_limit_point=lambda point: None,
+    on_touch=lambda pressure: None,
+):
+    """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns (last CellState,
+    mesh facts).
 
-    on_limit_point(hifi.path.LimitPoint): told when the pressure has passed one. on_touch(pressure): told the pressure (MPa) of
-    first touch, once, before the first state beyond it. ConvergenceError when the path ends short; what was recorded before
-    has been seen by `on_state`.
+    on_limit_point(hifi.path.LimitPoint): told when the pressure has passed one. on_touch(pressure): told the
+    pressure (MPa) of first touch, once, before the first state beyond it. ConvergenceError when the path ends
+    short; what was recorded before has been seen by `on_state`.
     """
     edge_size = case.mesh_size * EDGE if case.graded else None
     medium = case.medium if case.contact == "third-medium" else None
     facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=medium is not None, edge_size=edge_size)
-    problem = CellProblem(case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None)
+    problem = CellProblem(
+        case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
+    )
     return _follow(case, problem, on_state, on_limit_point, on_touch), facts
 
 
@@ -61,7 +71,9 @@ def _follow(case, problem, on_state, on_limit_point, on_touch):
         """Tell of the first touch, once. A medium pushes long before it."""
         nonlocal touched
         if not touched and not medium:
-            met = watch.see(Load(problem.pressure.value.item()), system.walls.distance(), contact_force=system.overreach).walls_from
+            met = watch.see(
+                Load(problem.pressure.value.item()), system.walls.distance(), contact_force=system.overreach
+            ).walls_from
             if met:
                 touched = True
                 on_touch(met.pressure)
@@ -138,16 +150,18 @@ def _pushing(state):
 
 
 HEADER = [
-    *"pressure_kPa volume_mm3 e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm k_norm_per_mm k_dot_e_per_mm".split(),
-    *"force1_N force2_N force3_N moment1_N_mm moment2_N_mm moment3_N_mm unstable_directions largest_stretch".split(),
-    *"wall_distance_mm walls_overlap contact_force_N contact_area_mm2 contact_nearest_mm contact_farthest_mm contact_gamma".split(),
+    *"pressure_kPa volume_mm3 e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(),
+    *"k_norm_per_mm k_dot_e_per_mm force1_N force2_N force3_N moment1_N_mm moment2_N_mm moment3_N_mm".split(),
+    *"unstable_directions largest_stretch wall_distance_mm walls_overlap contact_force_N".split(),
+    *"contact_area_mm2 contact_nearest_mm contact_farthest_mm contact_gamma".split(),
     *(f"K{i}{j}" for i in range(1, 7) for j in range(1, 7)),
     *(f"kirchhoff{i}{j}" for i in range(1, 5) for j in range(1, 5)),
 ]
 
 
 def run_cell(path, directory, say=print):
-    """`pneunet cell`: solve CELL.toml; directory/cell gets cell.csv (a row a level), cell.msh, run.json and walls.png, the last state."""
+    """`pneunet cell`: solve CELL.toml; directory/cell gets cell.csv (a row a level), cell.msh, run.json and
+    walls.png, the last state."""
     case = read_cell(path)
     out = output_directory(Path(directory)) / "cell"
     rows, limit_points, started = [], [], time.perf_counter()
@@ -160,22 +174,37 @@ def run_cell(path, directory, say=print):
         last[:] = [state]
         e, k = state.strains.e, state.strains.k
         rows.append(
-            [state.pressure * KPA, state.volume, *e, *k, np.linalg.norm(k), k @ e, *state.force, *state.moment, state.unstable]
+            [
+                state.pressure * KPA,
+                state.volume,
+                *e,
+                *k,
+                np.linalg.norm(k),
+                k @ e,
+                *state.force,
+                *state.moment,
+                state.unstable,
+            ]
             + [state.largest_stretch]
             + [state.wall_distance, int(state.walls_overlap), *_contact(state)]
             + [*state.stiffness.ravel(), *state.kirchhoff_stiffness.ravel()]
         )
         write_csv(out / "cell.csv", HEADER, rows)
         say(
-            f"{state.pressure * KPA:7.2f} kPa  e1 {e[0]:.4f}  k1 {k[0] * 1e3:.2f} rad/m  k2 {k[1] * 1e3:.2f} 1/m  k3 {k[2] * 1e3:.2f} 1/m  "
-            f"volume {state.volume:.1f} mm3  "
-            f"stretch {state.largest_stretch:.2f}  {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}  "
-            f"wall distance {state.wall_distance:.3f} mm{_pushing(state)}{'  WALLS OVERLAP' * state.walls_overlap}"
+            f"{state.pressure * KPA:7.2f} kPa  e1 {e[0]:.4f}  k1 {k[0] * 1e3:.2f} rad/m  k2 {k[1] * 1e3:.2f}"
+            f" 1/m  k3 {k[2] * 1e3:.2f} 1/m  volume {state.volume:.1f} mm3  stretch"
+            f" {state.largest_stretch:.2f} "
+            f" {'stable' if not state.unstable else f'UNSTABLE in {state.unstable}'}  wall distance"
+            f" {state.wall_distance:.3f} mm{_pushing(state)}{'  WALLS OVERLAP' * state.walls_overlap}"
         )
 
     def touch(pressure):
         touched.append(pressure * KPA)
-        then = "beyond it states are marked 'walls overlap'" if case.contact == "none" else "contact holds them apart"
+        then = (
+            "beyond it states are marked 'walls overlap'"
+            if case.contact == "none"
+            else "contact holds them apart"
+        )
         say(f"walls touch at {touched[0]:.2f} kPa; {then}")
 
     status, facts, touched, last = "reached what was asked for", {}, [], []
@@ -196,6 +225,11 @@ def run_cell(path, directory, say=print):
         wall_seconds=time.perf_counter() - started,
     )
     if not facts:
-        raise ConvergenceError(f"cell: {status}; {len(rows)} levels are in {out}; try less pressure or control = 'volume'")
+        raise ConvergenceError(
+            f"cell: {status}; {len(rows)} levels are in {out}; try less pressure or control = 'volume'"
+        )
     drawn = draw_cell(CellProblem(case.segment, out / "cell.msh"), last[0], out / "walls.png")
-    say(f"done: {len(rows)} states in {out / 'cell.csv'}{', the last one in walls.png' * drawn}; K in N, N mm, N mm2 per unit of (e, k)")
+    say(
+        f"done: {len(rows)} states in {out / 'cell.csv'}{', the last one in walls.png' * drawn}; K in N, N"
+        " mm, N mm2 per unit of (e, k)"
+    )

@@ -18,15 +18,16 @@ RELATIVE_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class CellState:
-    """One equilibrium, per undeformed length: strains (e, k); force (N) and moment (N mm) in the section frame.
+    """One equilibrium, per undeformed length: strains (e, k); force (N) and moment (N mm) in the section
+    frame.
 
-    stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure in MPa;
-    unstable: directions in which the cell is unstable at this pressure (its free strains included). wall_distance: smallest
-    signed distance (mm) of neighbouring chambers' walls, `gap` that at rest; walls_overlap: it is negative and there was no contact
-    model, or one that has failed to hold them apart.
-    contact: hifi.walls.WallContact of the gap with the largest force, None without contact. array: the mixed state of the
-    problem (hifi.cell), what pictures and checks are made of. steps, factorisations in them and seconds: what it took to come
-    here from rest (hifi.cell_run).
+    stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure
+    in MPa; unstable: directions in which the cell is unstable at this pressure (its free strains included).
+    wall_distance: smallest signed distance (mm) of neighbouring chambers' walls, `gap` that at rest;
+    walls_overlap: it is negative and there was no contact model, or one that has failed to hold them apart.
+    contact: hifi.walls.WallContact of the gap with the largest force, None without contact. array: the mixed
+    state of the problem (hifi.cell), what pictures and checks are made of. steps, factorisations in them and
+    seconds: what it took to come here from rest (hifi.cell_run).
     """
 
     pressure: float
@@ -47,10 +48,12 @@ class CellState:
 
     @property
     def screw_compliance(self):
-        """(2, 2) of 1/N and 1/(N mm2): how k.k/2 and k.e of a free state change under the wrench m = a k + b e, n = b k.
+        """(2, 2) of 1/N and 1/(N mm2): how k.k/2 and k.e of a free state change under the wrench m = a k + b
+        e, n = b k.
 
-        This wrench is in equilibrium along a screw by itself, so that the gauge carries nothing, and k.k and k.e are the same
-        for every line and every gauge: so is this part of the compliance. The rest of `stiffness` belongs to the section frame.
+        This wrench is in equilibrium along a screw by itself, so that the gauge carries nothing, and k.k and
+        k.e are the same for every line and every gauge: so is this part of the compliance. The rest of
+        `stiffness` belongs to the section frame.
         """
         e, k = self.strains.e, self.strains.k
         wrenches = np.array([np.concatenate([0 * k, k]), np.concatenate([k, e])])
@@ -65,15 +68,19 @@ class CellState:
         """(4, 4) stiffness in (e1, k1, k2, k3) when the shears e2 and e3 relax."""
         kept, relaxed = [0, 3, 4, 5], [1, 2]
         K = self.stiffness
-        return K[np.ix_(kept, kept)] - K[np.ix_(kept, relaxed)] @ np.linalg.solve(K[np.ix_(relaxed, relaxed)], K[np.ix_(relaxed, kept)])
+        return K[np.ix_(kept, kept)] - K[np.ix_(kept, relaxed)] @ np.linalg.solve(
+            K[np.ix_(relaxed, relaxed)], K[np.ix_(relaxed, kept)]
+        )
 
 
 class CellSystem:
-    """State: unknowns of the cell, six gauge multipliers, six strains. Increments hold the strains that are free.
+    """State: unknowns of the cell, six gauge multipliers, six strains. Increments hold the strains that are
+    free.
 
-    held (6,) bool: which of (e, k) are prescribed. The load ramps: at `load` the pressure is pressure[0] + load *
-    pressure[1] (MPa) and the held strains are strains[0] + load * strains[1]. By default the load is the pressure and all
-    strains are free. Strains enter increments and residuals times the pitch, which makes their entries forces and lengths.
+    held (6,) bool: which of (e, k) are prescribed. The load ramps: at `load` the pressure is pressure[0] +
+    load * pressure[1] (MPa) and the held strains are strains[0] + load * strains[1]. By default the load is
+    the pressure and all strains are free. Strains enter increments and residuals times the pitch, which makes
+    their entries forces and lengths.
     """
 
     def __init__(self, problem, held=None, pressure=(0.0, 1.0), strains=None):
@@ -81,7 +88,9 @@ class CellSystem:
         self.held = np.zeros(6, bool) if held is None else np.asarray(held, bool)
         self._free = np.flatnonzero(~self.held)
         self._pressure = pressure
-        self._strains = [np.eye(6)[0], np.zeros(6)] if strains is None else [np.asarray(s, float) for s in strains]
+        self._strains = (
+            [np.eye(6)[0], np.zeros(6)] if strains is None else [np.asarray(s, float) for s in strains]
+        )
         n = problem.unknowns
         self._x = np.concatenate([np.zeros(n + 6), self._strains[0]])
         self._solver = self._matrix = self._pattern = None
@@ -129,10 +138,13 @@ class CellSystem:
 
     def residual(self):
         r, slope = self._parts()
-        return np.concatenate([r, slope[self._free] / self.pitch]), self.problem.segment.material.mu * self.pitch**2
+        return np.concatenate(
+            [r, slope[self._free] / self.pitch]
+        ), self.problem.segment.material.mu * self.pitch**2
 
     def load_gradient(self):
-        """Derivative of the residual by the load; through held strains with the factorised tangent's coupling."""
+        """Derivative of the residual by the load; through held strains with the factorised tangent's
+        coupling."""
         kept, ends = self.problem.pressure.value.copy(), []
         for value in (0.0, 1.0):
             self.problem.pressure.value = value
@@ -141,17 +153,22 @@ class CellSystem:
         gradient = self._pressure[1] * (ends[1] - ends[0])
         if self.held.any():
             rate = np.where(self.held, self._strains[1], 0.0)
-            gradient += np.concatenate([self._mixed @ rate, (self._curvature @ rate)[self._free] / self.pitch])
+            gradient += np.concatenate(
+                [self._mixed @ rate, (self._curvature @ rate)[self._free] / self.pitch]
+            )
         return gradient
 
     def factorise(self):
-        """Factorise the tangent. influence (unknowns + 6, 6): how unknowns and multipliers resist strains, K^-1 d2Pi/du d(e,k);
-        condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so on."""
+        """Factorise the tangent. influence (unknowns + 6, 6): how unknowns and multipliers resist strains,
+        K^-1 d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
+        on."""
         matrix, mixed, self._curvature = self.problem.tangent()
         if self._pattern is not matrix.indices:
             self._release()
             self._pattern = matrix.indices
-            self._matrix = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF)
+            self._matrix = PETSc.Mat().createAIJ(
+                matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
+            )
             self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self._solver = DirectSolver(self._matrix, MPI.COMM_SELF)
         else:
@@ -162,18 +179,25 @@ class CellSystem:
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
         self.influence = self._solver.solve_many(self._mixed)
         self.condensed = self._curvature - self._mixed.T @ self.influence
-        self._update = ContactUpdate(self.problem.contact.stiffnesses(factorised=True) if self.problem.contact else {})
+        self._update = ContactUpdate(
+            self.problem.contact.stiffnesses(factorised=True) if self.problem.contact else {}
+        )
 
     def renew(self):
         """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
-        return self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve) if self.problem.contact else False
+        return (
+            self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve)
+            if self.problem.contact
+            else False
+        )
 
     def _gap_gradients(self, points):
         rows, n = self.problem.contact.gradients(points), self.problem.unknowns
         return np.hstack([rows[:, :n], np.zeros((len(rows), 6)), rows[:, n:][:, self._free] / self.pitch])
 
     def solve(self, right):
-        """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was renewed."""
+        """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was
+        renewed."""
         return self._update.corrected(self._solve(right[:, None])[:, 0])
 
     def solve_inner(self, right):
@@ -192,7 +216,8 @@ class CellSystem:
 
     @property
     def unstable(self):
-        """Unstable directions of the factorised state: each multiplier takes one negative pivot, strains count apart."""
+        """Unstable directions of the factorised state: each multiplier takes one negative pivot, strains
+        count apart."""
         free = self.condensed[np.ix_(self._free, self._free)]
         inner = self._solver.negative_pivots - self.problem.constraints - 6
         return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))

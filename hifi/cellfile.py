@@ -24,12 +24,14 @@ EDGE = 0.2
 
 @dataclass(frozen=True)
 class CellCase:
-    """What CELL.toml says: pressure in MPa, mesh_size in mm, levels equal pressure steps at which the state is recorded.
+    """What CELL.toml says: pressure in MPa, mesh_size in mm, levels equal pressure steps at which the state
+    is recorded.
 
-    held: {index of (e, k): prescribed value, 1/mm for k}; reached from the free state at the top pressure. control:
-    'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor` times the volume at rest.
-    contact: 'auto': walls that touch are held apart by the `penalty`; 'third-medium': by the `medium` in the gap;
-    'none': they pass through each other. graded: elements shrink to mesh_size * EDGE at the body's edges, where stresses are singular.
+    held: {index of (e, k): prescribed value, 1/mm for k}; reached from the free state at the top pressure.
+    control: 'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor`
+    times the volume at rest. contact: 'auto': walls that touch are held apart by the `penalty`;
+    'third-medium': by the `medium` in the gap; 'none': they pass through each other. graded: elements shrink
+    to mesh_size * EDGE at the body's edges, where stresses are singular.
     """
 
     segment: Segment
@@ -61,7 +63,9 @@ def cell_from_tables(data, where):
         raise InputError(f"{where}: control = {control!r} is not known: write 'pressure' or 'volume'")
     contact = data.get("contact", CellCase.contact)
     if contact not in CONTACTS:
-        raise InputError(f"{where}: contact = {contact!r} is not known: write 'auto', 'third-medium' or 'none'")
+        raise InputError(
+            f"{where}: contact = {contact!r} is not known: write 'auto', 'third-medium' or 'none'"
+        )
     if contact == "third-medium" and control == "volume":
         raise InputError(f"{where}: contact = 'third-medium' goes with control = 'pressure'")
     graded = data.get("graded", CellCase.graded)
@@ -82,16 +86,29 @@ def cell_from_tables(data, where):
     volume_factor = ranged("volume_factor", CellCase.volume_factor, 1.001, 100)
     held_table = as_table(data.get("held", {}), f"{where} [held]")
     refuse_unknown(held_table, STRAINS, f"{where} [held]")
-    held = {STRAINS.index(key): float(number(value, key, f"{where} [held]")) for key, value in held_table.items()}
+    held = {
+        STRAINS.index(key): float(number(value, key, f"{where} [held]")) for key, value in held_table.items()
+    }
     if held and control == "volume":
         raise InputError(f"{where}: [held] strains go with control = 'pressure'")
     row = as_table(data["segment"], f"{where} [segment]")
     row.setdefault("chambers", 1)
     material, layer_material = (
-        material_from_table(data[key], f"{where} [{key}]") if key in data else None for key in ("material", "layer_material")
+        material_from_table(data[key], f"{where} [{key}]") if key in data else None
+        for key in ("material", "layer_material")
     )
     segment = segment_from_table(row, f"{where} [segment]", material, layer_material)
-    return CellCase(segment, pressure, float(mesh_size), levels, held, control, float(volume_factor), contact, graded=graded)
+    return CellCase(
+        segment,
+        pressure,
+        float(mesh_size),
+        levels,
+        held,
+        control,
+        float(volume_factor),
+        contact,
+        graded=graded,
+    )
 
 
 def cell_tables(case):

@@ -1,8 +1,9 @@
-"""checkpoint.npz: the memory of an equilibrium path on disk, for a run that goes on after a kill on any number of ranks.
+"""checkpoint.npz: the memory of an equilibrium path on disk, for a run that goes on after a kill on any
+number of ranks.
 
-It holds the accepted states that the predictor extrapolates and the state at which the lagged tangent was factorised, so
-that the run which goes on iterates as the killed one would have. Values are stored with the undeformed coordinates of
-their nodes, sorted by them: each rank finds its own.
+It holds the accepted states that the predictor extrapolates and the state at which the lagged tangent was
+factorised, so that the run which goes on iterates as the killed one would have. Values are stored with the
+undeformed coordinates of their nodes, sorted by them: each rank finds its own.
 """
 
 import io
@@ -21,12 +22,14 @@ from hifi.path import LimitPoint, PathState
 from hifi.stepping import Step
 
 NAME = "checkpoint.npz"
-#: mm; nodes of another mesh are further apart than this, and one that is moved by the rounding of its file is not
+#: mm; nodes of another mesh are further apart than this, and one that is moved by the rounding of its file is
+#: not
 NEAR = 1e-6
 
 
 def save(directory, path, step, stage, identity):
-    """Write the EquilibriumPath of a hifi.body.BodySystem after `step` of a `stage`; collective. OSError on all ranks.
+    """Write the EquilibriumPath of a hifi.body.BodySystem after `step` of a `stage`; collective. OSError on
+    all ranks.
 
     identity: {name: JSON value} of what the run is of; `read` compares it.
     """
@@ -42,7 +45,9 @@ def save(directory, path, step, stage, identity):
         "volume": np.array([a.volume for a in path.accepted]),
         "trusted": np.array(path.trusted),
         "first_compliance": np.array(path.first_compliance),
-        "limit_points": np.array([[p.load, p.volume, p.kind == "maximum"] for p in path.limit_points]).reshape(-1, 3),
+        "limit_points": np.array(
+            [[p.load, p.volume, p.kind == "maximum"] for p in path.limit_points]
+        ).reshape(-1, 3),
         "timings": np.array(list(newton.timings.values())),
     }
     for name, dofs, nodes, owned in _fields(problem):
@@ -53,7 +58,8 @@ def save(directory, path, step, stage, identity):
             content |= {f"{name}_nodes": X[order], name: np.array(values)[:, order]}
 
     def write():
-        archive = io.BytesIO()  # a zip file on a full disk fails a second time, out of reach, when Python discards it
+        # a zip file on a full disk fails a second time, out of reach, when Python discards it
+        archive = io.BytesIO()
         np.savez(archive, **content)
         with atomic_path(Path(directory) / NAME) as temporary:
             temporary.write_bytes(archive.getbuffer())
@@ -62,7 +68,8 @@ def save(directory, path, step, stage, identity):
 
 
 def read(directory, identity):
-    """{name: array} of the checkpoint in `directory`, None without one; InputError when it is of something else than `identity`."""
+    """{name: array} of the checkpoint in `directory`, None without one; InputError when it is of something
+    else than `identity`."""
     path = Path(directory) / NAME
     try:
         with np.load(path, allow_pickle=False) as stored:
@@ -82,7 +89,8 @@ def read(directory, identity):
 
 
 def restore(content, path):
-    """Put the EquilibriumPath where the checkpoint was written; its Step. Collective; InputError when the mesh is another."""
+    """Put the EquilibriumPath where the checkpoint was written; its Step. Collective; InputError when the
+    mesh is another."""
     problem = path.system.problem
     states = np.zeros((len(content["load"]), len(problem.array)))
     furthest, sizes = 0.0, True
@@ -93,13 +101,17 @@ def restore(content, path):
         states[:, dofs] = content[name][:, index]
     furthest = problem.mesh.comm.allreduce(furthest, op=MPI.MAX)
     if furthest > NEAR or not sizes:
-        raise InputError(f"{NAME}: belongs to another mesh (a node is {furthest:.1e} mm away): solve without --resume")
+        raise InputError(
+            f"{NAME}: belongs to another mesh (a node is {furthest:.1e} mm away): solve without --resume"
+        )
     loads, parameters = content["load"].tolist(), content["parameter"].tolist()
     accepted = [PathState(*each) for each in zip(parameters, loads, states, content["volume"].tolist())]
     factorised_at = (states[-1], loads[-1]) if len(states) > len(accepted) else None
     path.resume(accepted, float(content["trusted"]), factorised_at)
     path.first_compliance = float(content["first_compliance"])
-    path.limit_points = [LimitPoint(p, v, "maximum" if top else "minimum") for p, v, top in content["limit_points"].tolist()]
+    path.limit_points = [
+        LimitPoint(p, v, "maximum" if top else "minimum") for p, v, top in content["limit_points"].tolist()
+    ]
     path.newton.timings = dict(zip(path.newton.timings, content["timings"].tolist()))
     number, load, iterations, factorisations, *rest = content["step"].tolist()
     return Step(int(number), load, int(iterations), int(factorisations), *rest)
@@ -110,11 +122,17 @@ def _text(identity):
 
 
 def _fields(problem):
-    """(name, index into the state array, coordinates in mm, number of owned nodes) of both fields, ghosts included."""
+    """(name, index into the state array, coordinates in mm, number of owned nodes) of both fields, ghosts
+    included."""
     space, dofs = problem.pressure_space, problem.pressure_dofs
     return (
         ("displacement_mm", problem.displacement_dofs, problem.nodes, problem.owned_nodes),
-        ("multiplier_MPa", dofs, space.tabulate_dof_coordinates()[: len(dofs)], space.dofmap.index_map.size_local),
+        (
+            "multiplier_MPa",
+            dofs,
+            space.tabulate_dof_coordinates()[: len(dofs)],
+            space.dofmap.index_map.size_local,
+        ),
     )
 
 

@@ -13,9 +13,17 @@ from dolfinx.io import gmshio
 from base.errors import InputError
 
 OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
-#: sums may be reordered and pow need not set errno, so that loops over quadrature points vectorise: residuals take a third of
-#: the time, tangents 0.8 (infinities and NaN keep their meaning: they tell Newton's method that a step went too far)
-_FLAGS = ["-O2", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fassociative-math", "-fno-signed-zeros"]
+#: sums may be reordered and pow need not set errno, so that loops over quadrature points vectorise: residuals
+#: take a third of the time, tangents 0.8 (infinities and NaN keep their meaning: they tell Newton's method
+#: that a step went too far)
+_FLAGS = [
+    "-O2",
+    "-march=native",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fassociative-math",
+    "-fno-signed-zeros",
+]
 #: timeout in s: another run may be compiling the same form into the same cache just now
 COMPILER = {"cffi_extra_compile_args": _FLAGS, "timeout": 60}
 VERSION = dolfinx.__version__
@@ -23,7 +31,8 @@ VERSION = dolfinx.__version__
 
 @contextmanager
 def quiet_compiler():
-    """Compiling logs every gcc line at level INFO, and ffcx has the root logger print that to standard error."""
+    """Compiling logs every gcc line at level INFO, and ffcx has the root logger print that to standard
+    error."""
     before = logging.root.manager.disable
     logging.disable(logging.INFO)
     try:
@@ -49,7 +58,8 @@ def mixed_space(mesh, degree=2):
 
 @quiet_compiler()
 def cell_vectors(mesh, size):
-    """Space of one vector of `size` numbers a cell: tested with it, a form with free components is assembled in one pass."""
+    """Space of one vector of `size` numbers a cell: tested with it, a form with free components is assembled
+    in one pass."""
     if OLD:
         return fem.VectorFunctionSpace(mesh, ("DG", 0), dim=size)
     return fem.functionspace(mesh, ("DG", 0, (size,)))
@@ -63,8 +73,11 @@ def compile_form(form):
 
 @quiet_compiler()
 def expression(mesh, ufl_expression, points):
-    """Callable: local cells (n,) -> values (n, points, components) of a UFL expression at reference points."""
-    compiled = fem.Expression(ufl_expression, points, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER}))
+    """Callable: local cells (n,) -> values (n, points, components) of a UFL expression at reference
+    points."""
+    compiled = fem.Expression(
+        ufl_expression, points, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER})
+    )
 
     def evaluate(cells):
         values = compiled.eval(cells) if OLD else compiled.eval(mesh, cells)
@@ -84,7 +97,8 @@ def scatter_add(function):
 
 def read_mesh(path, comm):
     """(mesh, cell tags, facet tags) of a gmsh file, read on rank 0 and distributed."""
-    # gmshio.read_from_msh of 0.5 fails by itself, and a failure on rank 0 alone would leave the others waiting
+    # gmshio.read_from_msh of 0.5 fails by itself, and a failure on rank 0 alone would leave the others
+    # waiting
     import gmsh
 
     error = None

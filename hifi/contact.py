@@ -1,12 +1,15 @@
-"""Third-medium contact: the gap between two walls is filled with a medium that is soft until it is nearly squeezed out.
+"""Third-medium contact: the gap between two walls is filled with a medium that is soft until it is nearly
+squeezed out.
 
-Wriggers, Schroeder & Schwarz (Comput. Mech. 52, 2013) put a medium where bodies may touch; Bluhm, Sigmund & Poulios (Comput.
-Mech. 67, 2021) keep its elements in shape by penalising second gradients. Here, with J = det F and per undeformed volume,
+Wriggers, Schroeder & Schwarz (Comput. Mech. 52, 2013) put a medium where bodies may touch; Bluhm, Sigmund &
+Poulios (Comput. Mech. 67, 2021) keep its elements in shape by penalising second gradients. Here, with J = det
+F and per undeformed volume,
     psi = gamma mu [5/6 L^2 + (|F|^2 - 3 - 2 L)/2] + kr mu/2 |grad F|^2 exp(-5 J+),
-L = ln J down to J0 and its quadratic continuation below, J+ a smooth positive part of J. The medium transmits pressure without
-friction. It also stiffens gaps that are open: a bias that vanishes with gamma, while a soft medium is hard to follow along
-the load. So the path is followed with a stiff medium, and at each load that is recorded the medium is softened with
-everything else held (`soften`), which is a path of its own with steps that fail and are cut back.
+L = ln J down to J0 and its quadratic continuation below, J+ a smooth positive part of J. The medium transmits
+pressure without friction. It also stiffens gaps that are open: a bias that vanishes with gamma, while a soft
+medium is hard to follow along the load. So the path is followed with a stiff medium, and at each load that is
+recorded the medium is softened with everything else held (`soften`), which is a path of its own with steps
+that fail and are cut back.
 """
 
 from dataclasses import dataclass
@@ -30,7 +33,8 @@ SMALLEST_SOFTENING = 0.03
 
 @dataclass(frozen=True)
 class ThirdMedium:
-    """gamma: shear modulus over the body's, (followed, recorded); regularisation kr in mm2 and J0 likewise."""
+    """gamma: shear modulus over the body's, (followed, recorded); regularisation kr in mm2 and J0
+    likewise."""
 
     gamma: tuple = (5e-4, 2e-5)
     regularisation: tuple = (5e-3, 1e-3)
@@ -41,12 +45,19 @@ class ThirdMedium:
         return MediumEnergy(self, mesh)
 
     def softer(self, start, end):
-        """The medium that goes from `start` times the recorded one to `end` times it; squeezed it is thinner likewise, by J0."""
-        return ThirdMedium(*((start * recorded, end * recorded) for _, recorded in (self.gamma, self.regularisation, self.smallest_volume)))
+        """The medium that goes from `start` times the recorded one to `end` times it; squeezed it is thinner
+        likewise, by J0."""
+        return ThirdMedium(
+            *(
+                (start * recorded, end * recorded)
+                for _, recorded in (self.gamma, self.regularisation, self.smallest_volume)
+            )
+        )
 
 
 class MediumEnergy:
-    """The energy with its parameters as constants that `softening` sets: 0 the followed, 1 the recorded medium."""
+    """The energy with its parameters as constants that `softening` sets: 0 the followed, 1 the recorded
+    medium."""
 
     def __init__(self, medium, mesh):
         self._constants = [fem.Constant(mesh, PETSc.ScalarType(1.0)) for _ in range(3)]
@@ -119,7 +130,8 @@ class Softening:
 
 
 def soften(system, energy, options):
-    """Walk from the followed medium's equilibrium towards the recorded one's; gamma of the last equilibrium on the way."""
+    """Walk from the followed medium's equilibrium towards the recorded one's; gamma of the last equilibrium
+    on the way."""
     path = EquilibriumPath(Softening(system, energy), LoadControl(), options)
     try:
         run_steps(path, 1.0, StepSize(0.5, SMALLEST_SOFTENING))

@@ -1,7 +1,8 @@
 """A factorised tangent brought up to date with which walls touch: a low-rank update (Woodbury).
 
-A point of a wall that comes into touch adds its stiffness times g g^T to the tangent, g the gradient of its gap; one that leaves
-takes it away. Its column K^-1 g costs one solve, much less than a factorisation, and serves until the next one.
+A point of a wall that comes into touch adds its stiffness times g g^T to the tangent, g the gradient of its
+gap; one that leaves takes it away. Its column K^-1 g costs one solve, much less than a factorisation, and
+serves until the next one.
 """
 
 import numpy as np
@@ -12,7 +13,8 @@ SMALLEST = 0.02
 
 
 class TouchingSides:
-    """The sides of gaps that push at the last residual (`now`) and at the last tangent (`then`), of a cell or of a body's rank.
+    """The sides of gaps that push at the last residual (`now`) and at the last tangent (`then`), of a cell or
+    of a body's rank.
 
     A side has a number, a hifi.wall_contact.Touching and gap_gradients, sparse (points, n).
     """
@@ -23,13 +25,19 @@ class TouchingSides:
     def stiffnesses(self, factorised=False):
         """{point: N/mm} at the last residual, or at the last tangent."""
         sides = self.then if factorised else self.now
-        return {point: value for side in sides for point, value in side.touching.stiffnesses(side.number).items()}
+        return {
+            point: value for side in sides for point, value in side.touching.stiffnesses(side.number).items()
+        }
 
     def gap_gradients(self, points, n):
         """Sparse (m, n): how the gaps of points change; zero for those that push at no side here."""
         places, rows = {p: i for i, p in enumerate(points)}, {}
         for side in [*self.now, *self.then]:  # what is taken away was put in as it was then
-            chosen = [(places[p], row) for row, p in enumerate(side.touching.stiffnesses(side.number)) if p in places]
+            chosen = [
+                (places[p], row)
+                for row, p in enumerate(side.touching.stiffnesses(side.number))
+                if p in places
+            ]
             if chosen:
                 to, of = np.array(chosen).T
                 rows |= dict(zip(to.tolist(), side.gap_gradients[of]))
@@ -38,19 +46,20 @@ class TouchingSides:
 
 
 class ContactUpdate:
-    """K^-1 of a factorised tangent K, corrected to (K + U^T D U)^-1: U the gap gradients (m, n), D stiffness changes (m,) in N/mm."""
+    """K^-1 of a factorised tangent K, corrected to (K + U^T D U)^-1: U the gap gradients (m, n), D stiffness
+    changes (m,) in N/mm."""
 
     def __init__(self, stiffnesses=None, most=200, total=lambda part: part):
-        """stiffnesses: {point: N/mm} in the factorised tangent. most: columns above which a factorisation is cheaper. total: sums
-        over the ranks that hold parts of (n,)."""
+        """stiffnesses: {point: N/mm} in the factorised tangent. most: columns above which a factorisation is
+        cheaper. total: sums over the ranks that hold parts of (n,)."""
         self._most, self._total = most, total
         self._then, self._places = stiffnesses or {}, {}
         self._rows = self._columns = None
         self._changes = np.zeros(0)
 
     def renew(self, now, gradients, solve):
-        """Take the present stiffnesses {point: N/mm}; True where the tangent has changed, False where not, None where a new
-        factorisation is due.
+        """Take the present stiffnesses {point: N/mm}; True where the tangent has changed, False where not,
+        None where a new factorisation is due.
 
         gradients(points) -> (m, n) of their gaps; solve((n, m)) -> K^-1 times it.
         """

@@ -1,8 +1,10 @@
-"""What closes the equations for the load along a path: the load itself, the cavity's volume, or the arc length.
+"""What closes the equations for the load along a path: the load itself, the cavity's volume, or the arc
+length.
 
 A control offers, for the path's scalar parameter,
     satisfied(system, parameter)                   whether its own equation holds
-    close(system, parameter, step, load_step)      the correction completed so that its linearised equation holds
+    close(system, parameter, step, load_step)      the correction completed so that its linearised equation
+                                                   holds
     tangent(system) -> (d state, d load)           per unit of the parameter, with the factorised tangent
     accepted(parameter, system)                    told after every accepted state
 """
@@ -29,7 +31,8 @@ class LoadControl:
 
 
 class _Bordered:
-    """One more unknown, the load, and one more equation g(state) = parameter with gradient `row`: block elimination."""
+    """One more unknown, the load, and one more equation g(state) = parameter with gradient `row`: block
+    elimination."""
 
     def close(self, system, parameter, step, load_step):
         along = -system.solve(system.load_gradient())
@@ -48,9 +51,11 @@ class _Bordered:
 
 
 class VolumeControl(_Bordered):
-    """The parameter is the cavity's volume (mm3), the load its pressure: walks through limit points of the pressure.
+    """The parameter is the cavity's volume (mm3), the load its pressure: walks through limit points of the
+    pressure.
 
-    The energy's load term is -P V, so the gradient of the volume is minus the residual's derivative by the load.
+    The energy's load term is -P V, so the gradient of the volume is minus the residual's derivative by the
+    load.
     """
 
     name = "volume"
@@ -69,7 +74,8 @@ class VolumeControl(_Bordered):
 class ArcLength(_Bordered):
     """The parameter is the distance walked along the secant of the last two accepted states (Riks 1979).
 
-    Distance is the root mean square displacement of the nodes in mm: it also grows where load and volume turn back.
+    Distance is the root mean square displacement of the nodes in mm: it also grows where load and volume turn
+    back.
     """
 
     name = "arc length"

@@ -1,7 +1,8 @@
-"""Caches of compiled forms of which each serves one process at a time, so that cases side by side do not compile into the same.
+"""Caches of compiled forms of which each serves one process at a time, so that cases side by side do not
+compile into the same.
 
-A process that is killed while it compiles leaves half a module, for which every later one would wait in vain; here nobody else
-can be at it, and what is unfinished is removed.
+A process that is killed while it compiles leaves half a module, for which every later one would wait in vain;
+here nobody else can be at it, and what is unfinished is removed.
 """
 
 import fcntl
@@ -14,13 +15,15 @@ from pathlib import Path
 
 @contextmanager
 def own_cache():
-    """A folder for XDG_CACHE_HOME, the first of $XDG_CACHE_HOME/pneunet/HOST-0, HOST-1, ... that nobody uses; ours within the block.
+    """A folder for XDG_CACHE_HOME, the first of $XDG_CACHE_HOME/pneunet/HOST-0, HOST-1, ... that nobody uses;
+    ours within the block.
 
     Forms compiled there by earlier cases are found again. The lock falls with this process, however it ends.
     """
     root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "pneunet"
     for number in itertools.count():
-        folder = root / f"{socket.gethostname()}-{number}"  # modules are compiled for this machine's processor
+        # modules are compiled for this machine's processor
+        folder = root / f"{socket.gethostname()}-{number}"
         folder.mkdir(parents=True, exist_ok=True)
         with open(folder / "lock", "w") as lock:
             try:

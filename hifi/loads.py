@@ -11,7 +11,8 @@ PRESSURE_DEGREE = 4
 class Pressure:
     """Follower pressure `value` (MPa) on tagged facets: -P V, so P inner(J inv(F).T N, v) in the residual.
 
-    closed: the facets close a cavity, so that the load's tangent is symmetric; an open loaded patch has closed = False.
+    closed: the facets close a cavity, so that the load's tangent is symmetric; an open loaded patch has
+    closed = False.
     """
 
     has_tangent = True
@@ -23,7 +24,12 @@ class Pressure:
         """Residual form (N, tested with v); called once by the problem this load acts on."""
         mesh = problem.mesh
         self.value = fem.Constant(mesh, PETSc.ScalarType(0.0))
-        ds = ufl.Measure("ds", domain=mesh, subdomain_data=problem.facet_tags, metadata={"quadrature_degree": PRESSURE_DEGREE})
+        ds = ufl.Measure(
+            "ds",
+            domain=mesh,
+            subdomain_data=problem.facet_tags,
+            metadata={"quadrature_degree": PRESSURE_DEGREE},
+        )
         F = ufl.Identity(3) + ufl.grad(u)
         area = ufl.det(F) * ufl.inv(F).T * ufl.FacetNormal(mesh)
         self.volume_form = -ufl.inner(ufl.SpatialCoordinate(mesh) + u, area) / 3 * ds(self.tags)
@@ -34,7 +40,8 @@ class Pressure:
 
 
 class Gravity:
-    """Weight: `value` times the acceleration (3,) in mm/s^2 on materials {cell tag: law with a density, or one law}."""
+    """Weight: `value` times the acceleration (3,) in mm/s^2 on materials {cell tag: law with a density, or
+    one law}."""
 
     has_tangent = False
     closed = True
@@ -45,7 +52,9 @@ class Gravity:
     def term(self, problem, u, v):
         mesh = problem.mesh
         self.value = fem.Constant(mesh, PETSc.ScalarType(0.0))
-        dx = ufl.Measure("dx", domain=mesh, subdomain_data=problem.cell_tags, metadata={"quadrature_degree": 2})
+        dx = ufl.Measure(
+            "dx", domain=mesh, subdomain_data=problem.cell_tags, metadata={"quadrature_degree": 2}
+        )
         groups = {}
         if isinstance(self.materials, dict):
             for tag, material in self.materials.items():
@@ -54,7 +63,10 @@ class Gravity:
         else:
             parts = [(self.materials.density, dx)]
         g = ufl.as_vector([fem.Constant(mesh, PETSc.ScalarType(a)) for a in self.acceleration])
-        return sum(-self.value * fem.Constant(mesh, PETSc.ScalarType(density)) * ufl.inner(g, v) * d for density, d in parts)
+        return sum(
+            -self.value * fem.Constant(mesh, PETSc.ScalarType(density)) * ufl.inner(g, v) * d
+            for density, d in parts
+        )
 
     def update(self, problem):
         pass
@@ -63,9 +75,9 @@ class Gravity:
 class EndLoad:
     """Dead force (3,) in N and moment (3,) in N mm, fixed in space, on a tagged face, times `value`.
 
-    The traction force/A + w x (x - c), c the face's centre and w such that it has exactly this moment about c, is even
-    over the reference area. A moment fixed in space is not conservative: its (skew) tangent is left out, Newton finds
-    the equilibrium all the same.
+    The traction force/A + w x (x - c), c the face's centre and w such that it has exactly this moment about
+    c, is even over the reference area. A moment fixed in space is not conservative: its (skew) tangent is
+    left out, Newton finds the equilibrium all the same.
     """
 
     has_tangent = False
@@ -80,8 +92,15 @@ class EndLoad:
         mesh = problem.mesh
         self.value = fem.Constant(mesh, PETSc.ScalarType(0.0))
         self._face = FaceQuadrature(problem, self.tag)
-        self._even, self._spin, self._centre = (fem.Constant(mesh, PETSc.ScalarType(np.zeros(3))) for _ in range(3))
-        ds = ufl.Measure("ds", domain=mesh, subdomain_data=problem.facet_tags, metadata={"quadrature_degree": PRESSURE_DEGREE})
+        self._even, self._spin, self._centre = (
+            fem.Constant(mesh, PETSc.ScalarType(np.zeros(3))) for _ in range(3)
+        )
+        ds = ufl.Measure(
+            "ds",
+            domain=mesh,
+            subdomain_data=problem.facet_tags,
+            metadata={"quadrature_degree": PRESSURE_DEGREE},
+        )
         x = ufl.SpatialCoordinate(mesh) + u
         traction = self._even + ufl.cross(self._spin, x - self._centre)
         return -self.value * ufl.inner(traction, v) * ds(self.tag)

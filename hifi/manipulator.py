@@ -23,7 +23,8 @@ from hifi.stretch import PrincipalStretch
 from hifi.touch import Load, Touch, TouchWatch
 from hifi.walls import WallDistances
 
-#: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how far they strain
+#: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how
+#: far they strain
 TURN_PER_STEP = 2.0
 #: the first stage of a path; the others are called after the control (geometry.loading.CONTROLS)
 DEAD_LOADS = "dead loads"
@@ -31,12 +32,12 @@ DEAD_LOADS = "dead loads"
 
 @dataclass(frozen=True)
 class Measured:
-    """One accepted state, the same on all ranks but for `walls`, the smallest distance in each gap (rank 0 only). Pressure in MPa,
-    lengths in mm. touch: whether parts of the body run into each other.
+    """One accepted state, the same on all ranks but for `walls`, the smallest distance in each gap (rank 0
+    only). Pressure in MPa, lengths in mm. touch: whether parts of the body run into each other.
 
-    dead_loads: the fraction of them that acts. unstable: unstable directions at fixed loads of the tangent factorised last: at
-    this very state if stability_factorisations is 1, in this step or before otherwise. limit_points: hifi.path.LimitPoints of
-    the pressure passed so far.
+    dead_loads: the fraction of them that acts. unstable: unstable directions at fixed loads of the tangent
+    factorised last: at this very state if stability_factorisations is 1, in this step or before otherwise.
+    limit_points: hifi.path.LimitPoints of the pressure passed so far.
     """
 
     step: int
@@ -61,21 +62,34 @@ class ManipulatorSolve:
     """The boundary value problem of a meshed manipulator with everything that is measured on it."""
 
     def __init__(
-        self, manipulator, mesh_path, comm=MPI.COMM_WORLD, newton_options=None, flip_y=False, loads=None, hold_tip=False, contact=None
+        self,
+        manipulator,
+        mesh_path,
+        comm=MPI.COMM_WORLD,
+        newton_options=None,
+        flip_y=False,
+        loads=None,
+        hold_tip=False,
+        contact=None,
     ):
-        """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh. loads:
-        geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at rest.
-        contact: the hifi.wall_contact.WallPenalty between neighbouring chambers; without it they may pass through each other."""
+        """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh.
+        loads: geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at
+        rest. contact: the hifi.wall_contact.WallPenalty between neighbouring chambers; without it they may
+        pass through each other."""
         self.manipulator, self.comm, self.newton_options = manipulator, comm, newton_options
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
         if flip_y:
             mesh.geometry.x[:, 1] *= -1
         materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
-        materials |= {cad.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness}
+        materials |= {
+            cad.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness
+        }
         self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
         self.dead = _dead(loads or DeadLoads(), materials)
         supports = [Support(cad.BASE)] + [Support(cad.TIP)] * hold_tip
-        self.problem = MixedProblem(mesh, cell_tags, facet_tags, materials, supports, [self.pressure, *self.dead])
+        self.problem = MixedProblem(
+            mesh, cell_tags, facet_tags, materials, supports, [self.pressure, *self.dead]
+        )
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
         coordinates = RodCoordinates(self.problem.nodes, self.problem.owned_nodes, comm, spacing)
         self.system = BodySystem(self.problem, coordinates, self._set_pressure)
@@ -85,7 +99,9 @@ class ManipulatorSolve:
         if contact:
             owners = [manipulator.segments[number - 1] for number, _, _, _ in self.walls.gaps]
             laws = [contact.on(s.material.mu, s.gap) for s in owners]
-            self.problem.contact = BodyContact(self.problem, self.walls, laws, [s.gap for s in owners]) if laws else None
+            self.problem.contact = (
+                BodyContact(self.problem, self.walls, laws, [s.gap for s in owners]) if laws else None
+            )
         #: what the accepted states have met
         self.watch = TouchWatch(self.problem.contact is not None)
         self.stretch = PrincipalStretch(self.problem)
@@ -103,13 +119,16 @@ class ManipulatorSolve:
             load.value.value = fraction
 
     def begin(self, stage):
-        """From the present state on, walk along `stage`: DEAD_LOADS from none to all, or inflate under the control so called."""
+        """From the present state on, walk along `stage`: DEAD_LOADS from none to all, or inflate under the
+        control so called."""
         if stage == DEAD_LOADS:
             self.system.steer(self._set_dead, 0.0)
         else:
             self._set_dead(1.0)
             self.system.steer(self._set_pressure, float(self.pressure.value.value))
-        control = {"volume": VolumeControl, "arc length": lambda: ArcLength(self.system)}.get(stage, LoadControl)()
+        control = {"volume": VolumeControl, "arc length": lambda: ArcLength(self.system)}.get(
+            stage, LoadControl
+        )()
         start = {"volume": self.system.volume(), "arc length": 0.0}.get(stage, self.system.load)
         before, self.stage = self.path, stage
         self.path = EquilibriumPath(self.system, control, self.newton_options, start)
@@ -160,12 +179,14 @@ class ManipulatorSolve:
         control="pressure",
         stability=True,
     ):
-        """The dead loads, if there are any, in a ramp of their own; then inflate to `target`; a StepResult of the latter.
+        """The dead loads, if there are any, in a ramp of their own; then inflate to `target`; a StepResult of
+        the latter.
 
-        control: 'pressure' with a target in MPa (0: no inflation), 'volume' with one in mm3, 'arc length' with one in mm.
-        `on_measured` sees every accepted state. stability: the tangent is factorised at the end of either stage and at
-        every milestone, to count unstable directions there (counted apart from the stepper's own factorisations).
-        ConvergenceError when it stops short. `before`: the Step that this run goes on from (hifi.checkpoint).
+        control: 'pressure' with a target in MPa (0: no inflation), 'volume' with one in mm3, 'arc length'
+        with one in mm. `on_measured` sees every accepted state. stability: the tangent is factorised at the
+        end of either stage and at every milestone, to count unstable directions there (counted apart from the
+        stepper's own factorisations). ConvergenceError when it stops short. `before`: the Step that this run
+        goes on from (hifi.checkpoint).
         """
         if self.stage == DEAD_LOADS:
             result = StepResult()
@@ -186,7 +207,11 @@ class ManipulatorSolve:
         """StepSize of the inflation."""
         if self.stage == "pressure":
             softest = min(s.material.mu for s in self.manipulator.segments)
-            return StepSize(first=min(first_step or 0.01 * softest, target), smallest=1e-5 * softest, largest=0.05 * softest)
+            return StepSize(
+                first=min(first_step or 0.01 * softest, target),
+                smallest=1e-5 * softest,
+                largest=0.05 * softest,
+            )
         way = target - (self.rest_volume if self.stage == "volume" else 0.0)
         return StepSize(first=first_step or 0.02 * way, smallest=1e-5 * way, largest=0.1 * way)
 
@@ -195,7 +220,9 @@ class ManipulatorSolve:
 
         def limit():
             if len(self.path.accepted) > 1:
-                size.largest = min(largest, TURN_PER_STEP / self._turn_per_parameter(*self.path.accepted[-2:]))
+                size.largest = min(
+                    largest, TURN_PER_STEP / self._turn_per_parameter(*self.path.accepted[-2:])
+                )
 
         def on_step(step):
             self.last_step = step
@@ -210,7 +237,8 @@ class ManipulatorSolve:
         return run_steps(self.path, target, size, on_step, before)
 
     def _turn_per_parameter(self, first, second):
-        """Sum over the stations of how far each section turns against the one before, rad per parameter, of two PathStates."""
+        """Sum over the stations of how far each section turns against the one before, rad per parameter, of
+        two PathStates."""
         relative = []
         for accepted in (first, second):
             rotations = self.sections.frames(accepted.state)[:, :3, :3]
@@ -225,4 +253,6 @@ class ManipulatorSolve:
 def _dead(loads, materials):
     """hifi.loads of the DeadLoads that are not zero."""
     dead = [Gravity(materials, loads.gravity)] if any(loads.gravity) else []
-    return dead + [EndLoad(cad.TIP, loads.tip_force, loads.tip_moment)] * any([*loads.tip_force, *loads.tip_moment])
+    return dead + [EndLoad(cad.TIP, loads.tip_force, loads.tip_moment)] * any(
+        [*loads.tip_force, *loads.tip_moment]
+    )

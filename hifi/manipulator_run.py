@@ -36,12 +36,14 @@ def solve_design(
     milestones=(),
     on_measured=lambda measured: None,
 ):
-    """Mesh (if not there yet) and solve a geometry.designfile.Design; files in directory/mesh and directory/solve.
+    """Mesh (if not there yet) and solve a geometry.designfile.Design; files in directory/mesh and
+    directory/solve.
 
-    mesh_size in mm and pressure in MPa override the design's. `resume` goes on from directory/solve/checkpoint.npz, which
-    every accepted step leaves, on any number of ranks. milestones: pressures (MPa; mm3 or mm under another control) that are hit
-    exactly; on_measured(Measured) sees every accepted state. Returns the last Measured. Raises InputError on bad input and
-    ConvergenceError (with everything accepted on disk) when the end asked for cannot be reached.
+    mesh_size in mm and pressure in MPa override the design's. `resume` goes on from
+    directory/solve/checkpoint.npz, which every accepted step leaves, on any number of ranks. milestones:
+    pressures (MPa; mm3 or mm under another control) that are hit exactly; on_measured(Measured) sees every
+    accepted state. Returns the last Measured. Raises InputError on bad input and ConvergenceError (with
+    everything accepted on disk) when the end asked for cannot be reached.
     """
     directory, out = Path(directory), Path(directory) / "solve"
     goal = Goal.of(design, pressure)
@@ -64,23 +66,34 @@ def solve_design(
     files = ResultFiles(out, solve.walls.gaps)
     writer = FieldWriter(out, solve.problem, solve.stretch, solve.walls) if fields else None
     say(
-        f"solve: {facts['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size} rank{'s' * (comm.size > 1)}, "
-        f"{goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
+        f"solve: {facts['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size}"
+        f" rank{'s' * (comm.size > 1)}, {goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
     )
     breaks_at = break_stretch(design.manipulator)
     last, history, before, extras = [], [], None, {}
     if kept:
         solve.begin(str(kept["stage"]))
         before = solve.last_step = checkpoint.restore(kept, solve.path)
-        history, watched = _written(comm, out, lambda: (files.keep(before.number), files.history(), files.watched())[1:])
+        history, watched = _written(
+            comm, out, lambda: (files.keep(before.number), files.history(), files.watched())[1:]
+        )
         for state in watched:
             solve.watch.see(*state)
         last[:] = [solve.measure(before)]
         if goal.is_last(solve.stage) and before.load > goal.end(solve.stage, target) * (1 + 1e-12):
-            raise InputError(f"{out / checkpoint.NAME}: has passed {goal.key} = {goal.value:g} already: solve without --resume")
+            raise InputError(
+                f"{out / checkpoint.NAME}: has passed {goal.key} = {goal.value:g} already: solve without"
+                " --resume"
+            )
         say(f"resumed after step {before.number} at {goal.where(solve.stage, before.load)}")
         if writer:
-            _written(comm, out, lambda: writer.keep([(row["step"], goal.time(row["step"], row["pressure_kPa"])) for row in history]))
+            _written(
+                comm,
+                out,
+                lambda: writer.keep(
+                    [(row["step"], goal.time(row["step"], row["pressure_kPa"])) for row in history]
+                ),
+            )
 
     def record(status, failures=()):
         if comm.rank == 0:
@@ -123,17 +136,32 @@ def solve_design(
         last[:] = [m]
         if writer:
             writer.write(m.step, goal.time(m.step, m.pressure * KPA), m.touch.marks)
-        on_rank_0(comm, lambda: (files.add(m), history.append(files.history()[-1]), record("running, or ended by force")) and None)
+        on_rank_0(
+            comm,
+            lambda: (
+                (files.add(m), history.append(files.history()[-1]), record("running, or ended by force"))
+                and None
+            ),
+        )
         if m.step:  # last: what a checkpoint refers to is on disk
             checkpoint.save(out, solve.path, solve.last_step, solve.stage, identity)
             if comm.rank == 0:
                 start = solve.rest_volume if solve.stage == "volume" else 0.0
-                say(goal.progress(m, solve.stage, (solve.path.parameter - start) / (goal.end(solve.stage, target) - start), breaks_at))
+                say(
+                    goal.progress(
+                        m,
+                        solve.stage,
+                        (solve.path.parameter - start) / (goal.end(solve.stage, target) - start),
+                        breaks_at,
+                    )
+                )
         for text in news:
             say(text)
         on_measured(m)
 
-    complete = before and goal.is_last(solve.stage) and before.load >= (1 - 1e-12) * goal.end(solve.stage, target)
+    complete = (
+        before and goal.is_last(solve.stage) and before.load >= (1 - 1e-12) * goal.end(solve.stage, target)
+    )
     if complete:
         extras |= on_rank_0(comm, lambda: _extras_there(out))
     missing = [name for name, wanted in asdict(design.measure).items() if wanted and name not in extras]
@@ -149,11 +177,17 @@ def solve_design(
             result = solve.run(target, keep, milestones, before=before, control=goal.control)
     except KeyboardInterrupt:
         record("interrupted")
-        say(f"interrupted at {goal.where(solve.stage, solve.path.parameter)}; the result up to there is in {out}")
+        say(
+            f"interrupted at {goal.where(solve.stage, solve.path.parameter)}; the result up to there is in"
+            f" {out}"
+        )
         raise
     except ConvergenceError as error:
         failure, result = error, error.result
-        status = f"stopped at {goal.where(solve.stage, solve.path.parameter)} of {goal.key} = {goal.value:g}: {result.reason}"
+        status = (
+            f"stopped at {goal.where(solve.stage, solve.path.parameter)} of {goal.key} = {goal.value:g}:"
+            f" {result.reason}"
+        )
     if "tip_stiffness" in missing and not failure:
         extras["tip_stiffness"] = tip.stiffness(solve)
     _written(comm, out, lambda: record(status, result.failures))
@@ -162,7 +196,9 @@ def solve_design(
         raise ConvergenceError(goal.failure(last[0], solve.stage, solve.path.parameter, result, out))
     if "blocked_force" in missing:
         say("blocked force: the same body with its tip held")
-        extras["blocked_force"] = tip.blocked_force(design.manipulator, mesh_path, last[0].pressure, loads, comm, penalty)
+        extras["blocked_force"] = tip.blocked_force(
+            design.manipulator, mesh_path, last[0].pressure, loads, comm, penalty
+        )
         _written(comm, out, lambda: record(status, result.failures))
     ending = goal.done(last[0], solve.stage, solve.path.parameter)
     say("; ".join([ending, *map(limit_text, last[0].limit_points), f"results in {out}"]))
@@ -188,7 +224,8 @@ def break_stretch(manipulator):
 
 def _unwritable(out, error):
     return InputError(
-        f"{out}: cannot be written to ({error.strerror or error}): make room there and go on with pneunet solve --resume"
+        f"{out}: cannot be written to ({error.strerror or error}): make room there and go on with pneunet"
+        " solve --resume"
     )
 
 
@@ -226,6 +263,8 @@ def _mesh(design, directory, mesh_size, say):
     facts_path = directory / "mesh" / "mesh.json"
     if facts_path.exists() and (directory / "mesh" / "manipulator.msh").exists():
         facts = json.loads(facts_path.read_text())
-        if facts.get("mesh_size_mm") == mesh_size and facts.get("segments") == segment_tables(design.manipulator):
+        if facts.get("mesh_size_mm") == mesh_size and facts.get("segments") == segment_tables(
+            design.manipulator
+        ):
             return facts
     return mesh_manipulator(design.manipulator, mesh_size, directory / "mesh", say)

@@ -36,19 +36,21 @@ def yeoh(c, F):
 def gent(c, F):
     """-mu jm/2 ln(1 - x), x = (I1 - 3)/jm, written with the root of 1 - x.
 
-    The logarithm is gone from its derivative, and 1/(1 - x) beyond the limit x = 1 is a finite stress of wrong sign on
-    which Newton's method could settle. The root makes stress and tangent nan there, so that a step which leaves the
-    admissible range is recognised and cut back, and every accepted state is Gent's.
+    The logarithm is gone from its derivative, and 1/(1 - x) beyond the limit x = 1 is a finite stress of
+    wrong sign on which Newton's method could settle. The root makes stress and tangent nan there, so that a
+    step which leaves the admissible range is recognised and cut back, and every accepted state is Gent's.
     """
     x = (invariants(F)[0] - 3) / c["jm"]
     return -c["mu"] * c["jm"] * ufl.ln(ufl.sqrt(1 - x))
 
 
 def _root(I1, I2):
-    """Invariants (a, b) of the square root of a tensor with invariants (I1, I2, 1): a^2 - 2b = I1, b^2 - 2a = I2.
+    """Invariants (a, b) of the square root of a tensor with invariants (I1, I2, 1): a^2 - 2b = I1, b^2 - 2a =
+    I2.
 
-    Newton from a guess that is exact at the identity and off by a few percent at tenfold stretch; its matrix, 4 (a b - 1)
-    >= 32, is regular at repeated stretches and everywhere else, and so are the derivatives of all its steps.
+    Newton from a guess that is exact at the identity and off by a few percent at tenfold stretch; its matrix,
+    4 (a b - 1) >= 32, is regular at repeated stretches and everywhere else, and so are the derivatives of all
+    its steps.
     """
     b = ufl.sqrt(I2 + 2 * ufl.sqrt(I1 + 6))
     a = ufl.sqrt(I1 + 2 * b)
@@ -60,7 +62,8 @@ def _root(I1, I2):
 
 
 def _half_powers(weights, I1, I2):
-    """Sum of the weighted traces (less 3) of the powers -n..n of the fourth root of a tensor with these invariants."""
+    """Sum of the weighted traces (less 3) of the powers -n..n of the fourth root of a tensor with these
+    invariants."""
     a, b = _root(*_root(I1, I2))
     order = weights.ufl_shape[0] // 2
     energy = 0
@@ -73,7 +76,8 @@ def _half_powers(weights, I1, I2):
 
 
 def _frozen(F):
-    """F of functions that share their values with F's and are others to UFL: of the same value, with no derivative."""
+    """F of functions that share their values with F's and are others to UFL: of the same value, with no
+    derivative."""
     functions = {f: fem.Function(f.function_space, f.x) for f in extract_coefficients(F)}
     return ufl.replace(strip_variables(F), functions)
 
@@ -81,9 +85,9 @@ def _frozen(F):
 def ogden(c, F):
     """Series in half powers of the principal stretches (base.halfpowers).
 
-    Differentiating a long series twice by the displacement takes the form compiler minutes. The energy is therefore
-    written as its own Taylor polynomial in (I1, I2) about the current state: value, stress and tangent are exact there,
-    and the coefficients are plain numbers to the second derivative.
+    Differentiating a long series twice by the displacement takes the form compiler minutes. The energy is
+    therefore written as its own Taylor polynomial in (I1, I2) about the current state: value, stress and
+    tangent are exact there, and the coefficients are plain numbers to the second derivative.
     """
     here = [ufl.variable(x) for x in invariants(_frozen(F))]
     energy = _half_powers(c["half_power_weights"], *here)
@@ -95,7 +99,8 @@ def ogden(c, F):
     return energy
 
 
-#: law name -> energy density W(parameters as constants, deformation gradient) in MPa, without the volumetric part
+#: law name -> energy density W(parameters as constants, deformation gradient) in MPa, without the volumetric
+#: part
 ENERGIES = {
     "neo-Hookean": neo_hookean,
     "Mooney-Rivlin": mooney_rivlin,
@@ -113,10 +118,11 @@ def volumetric(c, J, p):
 
 
 def energy_density(mesh, material, F, p):
-    """W(F) + p (J - 1) - p^2/(2K) in MPa, the law's parameters as constants of `mesh`. Stored energy at equilibrium.
+    """W(F) + p (J - 1) - p^2/(2K) in MPa, the law's parameters as constants of `mesh`. Stored energy at
+    equilibrium.
 
-    material: a law of base.materials, or any other that brings its own `energy(c, F)` in MPa beside what those have: `law`,
-    `parameters` (names of its constants c) and `bulk_compliance`.
+    material: a law of base.materials, or any other that brings its own `energy(c, F)` in MPa beside what
+    those have: `law`, `parameters` (names of its constants c) and `bulk_compliance`.
     """
     energy = getattr(material, "energy", None) or ENERGIES[material.law]
     names = (*CONSTANTS.get(material.law, material.parameters), "bulk_compliance")

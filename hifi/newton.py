@@ -1,20 +1,26 @@
 """Newton's method with a lagged tangent and secant acceleration, for any system and any control.
 
-A *system* (hifi.body, hifi.cell_system) has a state (an array), a scalar `load` (pressure, a fraction of gravity, ...), and
+A *system* (hifi.body, hifi.cell_system) has a state (an array), a scalar `load` (pressure, a fraction of
+gravity, ...), and
     residual() -> ((n,) array, scale)     what must vanish, and the norm of the forces it balances
     load_gradient() -> (n,)               d residual / d load
-    factorise(), solve((n,)) -> (n,)      the tangent at the current state; K^-1 times an array, K possibly an older one
+    factorise(), solve((n,)) -> (n,)      the tangent at the current state; K^-1 times an array, K possibly an
+                                          older one
     moved(state, increment), dot(a, b)    retraction and inner product (over all ranks)
-    volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state (None: unknown)
-    renew(), overreach                    of walls that touch: brings the tangent up to date with what touches now (hifi.contact_update);
-                                          how deep they overlap at the last residual, over what a correction may make of it
-A *control* (hifi.control) closes the equations for the load. Between factorisations, steps are corrected by the secants seen
-so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear Algebra Appl. 16, 2009): the residual
-that the past increments explain is removed before the lagged tangent sees the rest. One solve and one residual an iteration.
-On slender bodies a lagged tangent is no help once walls have bulged, however small the step. What it makes worse is taken
-back, which costs a solve, and the tangent is factorised where the correction started: steps can be many times longer.
-Where walls touch, each change of what touches renews the tangent (an active-set iteration), and corrections that drive walls far
-into each other, unseen by a tangent that knew of no contact there, are shortened.
+    volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state
+                                          (None: unknown)
+    renew(), overreach                    of walls that touch: brings the tangent up to date with what touches
+                                          now (hifi.contact_update);
+                                          how deep they overlap at the last residual, over what a correction
+                                          may make of it
+A *control* (hifi.control) closes the equations for the load. Between factorisations, steps are corrected by
+the secants seen so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear
+Algebra Appl. 16, 2009): the residual that the past increments explain is removed before the lagged tangent
+sees the rest. One solve and one residual an iteration. On slender bodies a lagged tangent is no help once
+walls have bulged, however small the step. What it makes worse is taken back, which costs a solve, and the
+tangent is factorised where the correction started: steps can be many times longer. Where walls touch, each
+change of what touches renews the tangent (an active-set iteration), and corrections that drive walls far into
+each other, unseen by a tangent that knew of no contact there, are shortened.
 """
 
 from dataclasses import dataclass, field
@@ -26,7 +32,8 @@ from hifi.solver import NotConverged
 
 #: how often a correction is shortened at most
 SHORTENINGS = 4
-#: what a new tangent, and an updated one, must make of the residual where walls touch for the tangent to be updated further
+#: what a new tangent, and an updated one, must make of the residual where walls touch for the tangent to be
+#: updated further
 TANGENT_GAIN, UPDATE_GAIN = 0.2, 0.5
 #: tangents factorised for one step, after which it should have come closer where walls touch
 MOST_IN_CONTACT = 6
@@ -36,9 +43,9 @@ MOST_IN_CONTACT = 6
 class NewtonOptions:
     """relative_tolerance: of the norm of the forces balanced (absolute_tolerance in N, for no load at all).
 
-    patience: a new tangent is factorised when the lagged one would need more than this many iterations to finish, at the
-    rate of the last two. A factorisation costs 10 to 20 iterations at 30k to 150k dofs, and secants make the rate better
-    than it looks at first. secants: how many are kept.
+    patience: a new tangent is factorised when the lagged one would need more than this many iterations to
+    finish, at the rate of the last two. A factorisation costs 10 to 20 iterations at 30k to 150k dofs, and
+    secants make the rate better than it looks at first. secants: how many are kept.
     """
 
     relative_tolerance: float = 1e-8
@@ -82,11 +89,13 @@ class Newton:
         return r, np.sqrt(self.system.dot(r, r)), scale
 
     def solve(self, parameter):
-        """Iterate from the current state to equilibrium at the control's `parameter`; NotConverged otherwise."""
+        """Iterate from the current state to equilibrium at the control's `parameter`; NotConverged
+        otherwise."""
         o, system, control = self.options, self.system, self.control
         r, norm, scale = self.residual()
         history, secants = [norm], Secants(system, o.secants)
-        since, fresh = [norm], False  # residuals that the lagged tangent has left; whether it is of the present state
+        # residuals that the lagged tangent has left; whether it is of the present state
+        since, fresh = [norm], False
         factorised, due = 0, False  # tangents so far; whether walls that touch ask for the next
         for iteration in range(o.maximum_iterations + 1):
             tolerance = o.relative_tolerance * scale + o.absolute_tolerance
@@ -98,7 +107,9 @@ class Newton:
                 renewed, fresh = True, True
                 factorised += 1
                 if factorised > MOST_IN_CONTACT and system.overreach > 0 and norm > 0.1 * history[0]:
-                    raise NotConverged(f"residual {norm:.1e} N after {factorised} tangents: what touches does not settle")
+                    raise NotConverged(
+                        f"residual {norm:.1e} N after {factorised} tangents: what touches does not settle"
+                    )
             if renewed:
                 secants.forget()
                 since = []
@@ -123,13 +134,19 @@ class Newton:
                 system.state, system.load, self.current = state, load, False
                 continue
             # what touches changes by much: iterate on it with new tangents until they reduce the residual
-            due = system.overreach > 0 and bool(renewed) and not new_norm < (TANGENT_GAIN if fresh else UPDATE_GAIN) * norm
+            due = (
+                system.overreach > 0
+                and bool(renewed)
+                and not new_norm < (TANGENT_GAIN if fresh else UPDATE_GAIN) * norm
+            )
             secants.add(step, load_step, new - r)
             r, norm, scale, fresh = new, new_norm, new_scale, False
             since.append(norm)
             if not np.isfinite(norm) or norm > o.growth_limit * max(history[0], scale):
                 raise NotConverged(f"residual grew to {norm:.1e} N")
-        raise NotConverged(f"residual {norm:.1e} N after {o.maximum_iterations} iterations (tolerance {tolerance:.1e} N)")
+        raise NotConverged(
+            f"residual {norm:.1e} N after {o.maximum_iterations} iterations (tolerance {tolerance:.1e} N)"
+        )
 
     def _correction(self, r, parameter, secants):
         """(increment, load increment) of one iteration."""

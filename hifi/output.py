@@ -17,9 +17,10 @@ TO_VTK = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
 class FieldWriter:
     """Gathers fields on rank 0 and writes them with VTK, so that files are the same for any number of ranks.
 
-    At points: displacement (mm), pressure (the multiplier, MPa), stretch (largest principal) and wall_distance_mm, on facing walls
-    the signed distance from the wall opposite and nan elsewhere; as field data the marks of hifi.touch. Each .vtu appears by
-    rename when it is whole, and only then in solution.pvd: a killed run leaves valid files.
+    At points: displacement (mm), pressure (the multiplier, MPa), stretch (largest principal) and
+    wall_distance_mm, on facing walls the signed distance from the wall opposite and nan elsewhere; as field
+    data the marks of hifi.touch. Each .vtu appears by rename when it is whole, and only then in solution.pvd:
+    a killed run leaves valid files.
     """
 
     def __init__(self, directory, problem, stretch, walls):
@@ -28,14 +29,17 @@ class FieldWriter:
         index_map = problem.displacement_space.dofmap.index_map
         self._owned = index_map.size_local
         cells = compat.cell_dofs(problem.displacement_space)[: problem.mesh.topology.index_map(3).size_local]
-        local_to_global = index_map.local_to_global(np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32))
+        local_to_global = index_map.local_to_global(
+            np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+        )
         self._cells = self._gather(local_to_global[cells])
         self._points = self._gather(problem.nodes[: self._owned])
         self._wall_nodes = walls.node_numbers(local_to_global)
         self._listed = []
 
     def keep(self, steps):
-        """List the files of an earlier run's `steps`, (number, pressure in kPa) each; rank 0's other files of steps go."""
+        """List the files of an earlier run's `steps`, (number, pressure in kPa) each; rank 0's other files of
+        steps go."""
         names = [(pressure, f"step_{number:04d}.vtu") for number, pressure in steps]
         self._listed = [(pressure, name) for pressure, name in names if (self.directory / name).exists()]
         if self.comm.rank == 0:
@@ -48,7 +52,8 @@ class FieldWriter:
         return np.concatenate(parts) if self.comm.rank == 0 else None
 
     def _pressure_at_nodes(self):
-        """Multiplier at the P2 nodes: corner values, averaged on mid-edges. One value per local displacement node."""
+        """Multiplier at the P2 nodes: corner values, averaged on mid-edges. One value per local displacement
+        node."""
         corner = self.problem.pressure_field()
         p2 = compat.cell_dofs(self.problem.displacement_space)
         p1 = compat.cell_dofs(self.problem.pressure_space)
@@ -68,13 +73,16 @@ class FieldWriter:
         return out
 
     def write(self, number, pressure_kPa, marks):
-        """Write the current state as step `number` at the given pressure; `marks`: {name: bool} for the file's field data."""
+        """Write the current state as step `number` at the given pressure; `marks`: {name: bool} for the
+        file's field data."""
         fields = {
             "displacement": self.problem.displacement()[: self._owned],
             "pressure": self._pressure_at_nodes()[: self._owned],
             "stretch": self.stretch.nodal()[: self._owned],
         }
-        fields = {name: self._gather(values) for name, values in fields.items()} | {"wall_distance_mm": self._wall_distance()}
+        fields = {name: self._gather(values) for name, values in fields.items()} | {
+            "wall_distance_mm": self._wall_distance()
+        }
         on_rank_0(self.comm, lambda: self._save(fields, marks, number, pressure_kPa))
 
     def _save(self, fields, marks, number, pressure_kPa):
@@ -82,7 +90,9 @@ class FieldWriter:
         from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
         cells = np.hstack([np.full((len(self._cells), 1), 10), self._cells[:, TO_VTK]])
-        grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), QUADRATIC_TETRA, np.uint8), self._points)
+        grid = pyvista.UnstructuredGrid(
+            cells.ravel(), np.full(len(cells), QUADRATIC_TETRA, np.uint8), self._points
+        )
         for name, values in fields.items():
             grid.point_data[name] = values.astype(np.float32)
         for name, value in marks.items():
@@ -101,5 +111,6 @@ class FieldWriter:
         rows = "".join(f'  <DataSet timestep="{p:.9g}" part="0" file="{f}"/>\n' for p, f in self._listed)
         write_text(
             self.directory / "solution.pvd",
-            f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n <Collection>\n{rows} </Collection>\n</VTKFile>\n',
+            f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n <Collection>\n{rows}'
+            " </Collection>\n</VTKFile>\n",
         )

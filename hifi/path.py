@@ -1,4 +1,5 @@
-"""The equilibrium path of a system under a growing control parameter: predictor, corrector, memory, limit points."""
+"""The equilibrium path of a system under a growing control parameter: predictor, corrector, memory, limit
+points."""
 
 from dataclasses import dataclass
 
@@ -24,7 +25,8 @@ class PathState:
 
 @dataclass(frozen=True)
 class LimitPoint:
-    """Where the load stops growing ('maximum') or falling ('minimum') along the path; volume of the cavity in mm3."""
+    """Where the load stops growing ('maximum') or falling ('minimum') along the path; volume of the cavity in
+    mm3."""
 
     load: float
     volume: float
@@ -32,15 +34,20 @@ class LimitPoint:
 
 
 def limit_point(three):
-    """The LimitPoint between three consecutive PathStates, by the parabola through them; None when the load goes on."""
-    p, loads, volumes = (np.array([getattr(a, name) for a in three]) for name in ("parameter", "load", "volume"))
+    """The LimitPoint between three consecutive PathStates, by the parabola through them; None when the load
+    goes on."""
+    p, loads, volumes = (
+        np.array([getattr(a, name) for a in three]) for name in ("parameter", "load", "volume")
+    )
     slopes = np.diff(loads) / np.diff(p)
     if not slopes[0] * slopes[1] < 0:
         return None
     middles = (p[1:] + p[:-1]) / 2
     top = middles[0] - slopes[0] * (middles[1] - middles[0]) / (slopes[1] - slopes[0])
     weights = np.array(lagrange_coefficients(p, top))
-    return LimitPoint(float(weights @ loads), float(weights @ volumes), "maximum" if slopes[0] > 0 else "minimum")
+    return LimitPoint(
+        float(weights @ loads), float(weights @ volumes), "maximum" if slopes[0] > 0 else "minimum"
+    )
 
 
 class EquilibriumPath:
@@ -54,7 +61,8 @@ class EquilibriumPath:
         self.parameter = start
         self.accepted = [self._present()]
         self._tangent, self._touching = None, system.overreach > 0
-        #: predicted residuals (relative to the load) above this failed before; a residual is 10x cheaper than a failure
+        #: predicted residuals (relative to the load) above this failed before; a residual is 10x cheaper than
+        #: a failure
         self.trusted = np.inf
         #: LimitPoints of the load passed so far; the load cannot pass one while it is the parameter itself
         self.limit_points = []
@@ -77,7 +85,8 @@ class EquilibriumPath:
             system.load = known[0].load + step * self._tangent[1]
             return system.moved(known[0].state, step * self._tangent[0])
         if self._touching:
-            known = known[-1:]  # extrapolated walls part or overlap; a tangent at rest keeps together what touches
+            # extrapolated walls part or overlap; a tangent at rest keeps together what touches
+            known = known[-1:]
         weights = lagrange_coefficients([a.parameter for a in known], parameter)
         system.load = sum(w * a.load for w, a in zip(weights, known))
         return system.extrapolated([a.state for a in known], weights)
@@ -87,7 +96,8 @@ class EquilibriumPath:
         return self.system.dot(gradient, self.system.solve(gradient))
 
     def resume(self, accepted, trusted, factorised_at=None):
-        """Go on from the `accepted` PathStates of another run, lagging the tangent at `factorised_at` (state, load) as it did."""
+        """Go on from the `accepted` PathStates of another run, lagging the tangent at `factorised_at` (state,
+        load) as it did."""
         self.accepted, self.trusted, self.parameter = list(accepted), trusted, accepted[-1].parameter
         if factorised_at is not None:
             self.system.state, self.system.load = factorised_at
@@ -102,7 +112,8 @@ class EquilibriumPath:
         self.system.state, self.system.load = kept.state, kept.load
 
     def advance(self, parameter):
-        """Solve at `parameter`; (iterations, factorisations, residual). NotConverged restores the accepted state."""
+        """Solve at `parameter`; (iterations, factorisations, residual). NotConverged restores the accepted
+        state."""
         system, newton, before = self.system, self.newton, self.system.factorisations
         state = self._predict(parameter)
         if self.control.name == "load":
@@ -134,10 +145,11 @@ class EquilibriumPath:
         return result.iterations, system.factorisations - before, result.residuals[-1]
 
     def diagnosis(self):
-        """What the tangent of the last accepted state says when no further step converges; '' when it has nothing to say.
+        """What the tangent of the last accepted state says when no further step converges; '' when it has
+        nothing to say.
 
-        Towards a limit point of the load the compliance grows without bound; beyond it, and beyond a bifurcation, a direction
-        is unstable. Costs a factorisation.
+        Towards a limit point of the load the compliance grows without bound; beyond it, and beyond a
+        bifurcation, a direction is unstable. Costs a factorisation.
         """
         if self.control.name != "load":
             return ""
@@ -147,9 +159,14 @@ class EquilibriumPath:
             return "a limit point of the load is likely (its tangent is singular)"
         signs, compliance = [], self._compliance()
         if self.system.unstable:
-            signs.append(f"the state is unstable in {self.system.unstable} direction{'s' * (self.system.unstable > 1)}")
+            signs.append(
+                f"the state is unstable in {self.system.unstable} direction{'s' * (self.system.unstable > 1)}"
+            )
         if compliance > SOFTENED * self.first_compliance:
-            signs.append(f"the body has become {compliance / self.first_compliance:.0f} times as compliant as at the start")
+            signs.append(
+                f"the body has become {compliance / self.first_compliance:.0f} times as compliant as at the"
+                " start"
+            )
         if compliance < 0:
             signs.append("the load would have to fall from here on")
         return f"a limit point of the load is likely ({', '.join(signs)})" if signs else ""

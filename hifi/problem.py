@@ -1,8 +1,8 @@
 """The mixed u-p boundary value problem: unknowns, residual, tangent.
 
-psi = W(F) + p (J - 1) - p^2/(2K) with Taylor-Hood P2/P1, plus the loads' terms (hifi.loads). Volume forms are integrated with
-degree 4 and pressure facets with degree 4, which is exact for the latter on straight-sided cells, so that the tangent of
-the pressure in a closed cavity is symmetric.
+psi = W(F) + p (J - 1) - p^2/(2K) with Taylor-Hood P2/P1, plus the loads' terms (hifi.loads). Volume forms are
+integrated with degree 4 and pressure facets with degree 4, which is exact for the latter on straight-sided
+cells, so that the tangent of the pressure in a closed cavity is symmetric.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,8 @@ VOLUME_DEGREE = 4
 class Support:
     """Prescribed displacement on tagged facets.
 
-    component: 0..2, or None for all three. motion(X (n, 3), load) -> (n,) or (n, 3) in mm; None keeps it at zero.
+    component: 0..2, or None for all three. motion(X (n, 3), load) -> (n,) or (n, 3) in mm; None keeps it at
+    zero.
     """
 
     tag: int
@@ -36,8 +37,8 @@ class MixedProblem:
     """A body, its materials, its clamps and its loads.
 
     mesh, cell_tags, facet_tags: as dolfinx gives them. materials: {cell tag: base.materials law}, or one law.
-    supports: list of `Support`. loads: list of hifi.loads objects; the first closed `Pressure` is the cavity whose
-    volume is measured. body_force(X) -> UFL vector in N/mm3, for manufactured solutions.
+    supports: list of `Support`. loads: list of hifi.loads objects; the first closed `Pressure` is the cavity
+    whose volume is measured. body_force(X) -> UFL vector in N/mm3, for manufactured solutions.
     """
 
     def __init__(self, mesh, cell_tags, facet_tags, materials, supports, loads=(), body_force=None):
@@ -46,7 +47,8 @@ class MixedProblem:
         self.state = fem.Function(self.space)
         displacement_space, to_mixed = self.space.sub(0).collapse()
         self.displacement_space = displacement_space
-        #: (nodes, 3) index into the mixed vector of each displacement component of each P2 node, ghosts included
+        #: (nodes, 3) index into the mixed vector of each displacement component of each P2 node, ghosts
+        #: included
         self.displacement_dofs = np.asarray(to_mixed).reshape(-1, 3)
         self.owned_nodes = displacement_space.dofmap.index_map.size_local
         self.nodes = displacement_space.tabulate_dof_coordinates()[: len(self.displacement_dofs)].copy()
@@ -58,7 +60,9 @@ class MixedProblem:
         self.supports = list(supports)
         self.bcs = [self._support_condition(support) for support in self.supports]
         #: supported dofs of the mixed vector: those this rank sees, and those it owns
-        self.fixed_dofs = np.unique(np.concatenate([bc.dof_indices()[0] for bc in self.bcs] + [np.zeros(0, np.int32)]))
+        self.fixed_dofs = np.unique(
+            np.concatenate([bc.dof_indices()[0] for bc in self.bcs] + [np.zeros(0, np.int32)])
+        )
         self._fixed_owned = self.fixed_dofs[self.fixed_dofs < self.owned]
         self.loads = list(loads)
         #: hifi.body_contact.BodyContact, where walls are held apart
@@ -68,7 +72,9 @@ class MixedProblem:
         u, p = ufl.split(self.state)
         v, _ = ufl.split(ufl.TestFunction(self.space))
         F = ufl.Identity(3) + ufl.grad(u)
-        dx = ufl.Measure("dx", domain=mesh, subdomain_data=cell_tags, metadata={"quadrature_degree": VOLUME_DEGREE})
+        dx = ufl.Measure(
+            "dx", domain=mesh, subdomain_data=cell_tags, metadata={"quadrature_degree": VOLUME_DEGREE}
+        )
         stored = self._stored_energy(F, p, cell_tags, materials, dx)
         internal = ufl.derivative(stored, self.state, ufl.TestFunction(self.space))
         terms = [(load, load.term(self, u, v)) for load in self.loads]
@@ -78,7 +84,9 @@ class MixedProblem:
         stiff = [term for load, term in terms if load.has_tangent]
         self._internal = compat.compile_form(internal)
         self._external = compat.compile_form(sum(external)) if external else None
-        self._tangent = compat.compile_form(ufl.derivative(internal + sum(stiff) if stiff else internal, self.state))
+        self._tangent = compat.compile_form(
+            ufl.derivative(internal + sum(stiff) if stiff else internal, self.state)
+        )
         self._cavity = next((load for load in self.loads if hasattr(load, "volume_form")), None)
         self._volume = compat.compile_form(self._cavity.volume_form) if self._cavity else None
         self._energy = compat.compile_form(stored)
@@ -153,7 +161,8 @@ class MixedProblem:
         return b.array.copy()
 
     def external_force(self):
-        """(owned dofs,) minus the forces of all loads (N) at the current state and values; supports included."""
+        """(owned dofs,) minus the forces of all loads (N) at the current state and values; supports
+        included."""
         if self._external is None:
             return np.zeros(self.owned)
         for load in self.loads:
@@ -161,7 +170,8 @@ class MixedProblem:
         return self._assemble(self._external)
 
     def residual(self):
-        """((owned dofs,) residual in N and mm3, norm of what it balances in N) at the current state and load values.
+        """((owned dofs,) residual in N and mm3, norm of what it balances in N) at the current state and load
+        values.
 
         The scale is the larger of the loads' and the support reactions' norm; supported entries are zero.
         """
@@ -181,7 +191,8 @@ class MixedProblem:
         return vector
 
     def reaction(self, tag, point=(0.0, 0.0, 0.0)):
-        """(force (3,) in N, moment (3,) in N mm about `point`) with which the tagged support holds the body."""
+        """(force (3,) in N, moment (3,) in N mm about `point`) with which the tagged support holds the
+        body."""
         r = self._assemble(self._internal) + self.external_force()
         nodes = fem.locate_dofs_topological(self.displacement_space, 2, self.facet_tags.find(tag))
         nodes = nodes[nodes < self.owned_nodes]

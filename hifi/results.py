@@ -19,23 +19,30 @@ TABLES = {
 
 
 class ResultFiles:
-    """CSV files of a run, rewritten whole after every accepted step so that a kill leaves them valid. Rank 0 only."""
+    """CSV files of a run, rewritten whole after every accepted step so that a kill leaves them valid. Rank 0
+    only."""
 
     def __init__(self, directory, gaps):
         self.directory, self.gaps = Path(directory), gaps
         self.steps, self.centrelines, self.segments = [], [], []
 
     def keep(self, last):
-        """Go on from an earlier run's files: its rows up to step `last`. InputError when they are of another version's making."""
+        """Go on from an earlier run's files: its rows up to step `last`. InputError when they are of another
+        version's making."""
         for name, columns in TABLES.items():
             header, rows = read_csv(self.directory / f"{name}.csv")
             if header != columns:
-                raise InputError(f"{self.directory / name}.csv: has not the columns of this version: solve without --resume")
+                raise InputError(
+                    f"{self.directory / name}.csv: has not the columns of this version: solve without"
+                    " --resume"
+                )
             setattr(self, name, [row for row in rows if int(row[0]) <= last])
 
     def watched(self):
-        """(Load, wall distance, body distance, contact force) of the steps kept, for a hifi.touch.TouchWatch."""
-        columns = "pressure_kPa dead_load_fraction smallest_wall_distance_mm body_distance_mm contact_force_N".split()
+        """(Load, wall distance, body distance, contact force) of the steps kept, for a
+        hifi.touch.TouchWatch."""
+        distances = "smallest_wall_distance_mm body_distance_mm".split()
+        columns = ["pressure_kPa", "dead_load_fraction", *distances, "contact_force_N"]
         rows = [[float(row[STEPS.index(name)]) for name in columns] for row in self.steps]
         return [(Load(p / KPA, dead), *seen) for p, dead, *seen in rows]
 

@@ -1,10 +1,11 @@
 """Large steps of slender bodies: extrapolation and Newton updates in section frames instead of displacements.
 
-A long inflated body rotates by many times what its walls strain, and both the extrapolation of displacements and the
-linearised rotation in a Newton step are wrong by the rotation squared. Stations along X1 carry rigid motions; what is
-extrapolated, or added, is the *relative* motion of neighbouring stations (composed exactly in SE(3)) and the position
-in the section's frame. Between stations motions are interpolated along the geodesic of SE(3). One station makes it a
-plain update with one rigid motion taken out; the same code serves spheres and manipulators.
+A long inflated body rotates by many times what its walls strain, and both the extrapolation of displacements
+and the linearised rotation in a Newton step are wrong by the rotation squared. Stations along X1 carry rigid
+motions; what is extrapolated, or added, is the *relative* motion of neighbouring stations (composed exactly
+in SE(3)) and the position in the section's frame. Between stations motions are interpolated along the
+geodesic of SE(3). One station makes it a plain update with one rigid motion taken out; the same code serves
+spheres and manipulators.
 """
 
 import numpy as np
@@ -16,7 +17,8 @@ from base.frames import FitMoments
 
 
 class RodCoordinates:
-    """Hat functions over stations of the undeformed x axis for the nodes (n, 3) this rank sees, `owned` of them first."""
+    """Hat functions over stations of the undeformed x axis for the nodes (n, 3) this rank sees, `owned` of
+    them first."""
 
     def __init__(self, nodes, owned, comm, spacing=None):
         self.nodes, self.owned, self.comm = nodes, owned, comm
@@ -33,18 +35,24 @@ class RodCoordinates:
         columns = np.column_stack([self.left, self.right])[:owned]
         rows = np.repeat(np.arange(len(weights)), 2)
         #: (stations, owned) hat functions
-        self._hats = csr_matrix((weights.ravel(), (columns.ravel(), rows)), shape=(self.stations, len(weights)))
+        self._hats = csr_matrix(
+            (weights.ravel(), (columns.ravel(), rows)), shape=(self.stations, len(weights))
+        )
 
     def _sum_over_stations(self, rows):
         """(stations, k) hat-weighted sums of the owned nodes' rows (n, k), over all ranks."""
         return self.comm.allreduce(self._hats @ rows, op=MPI.SUM)
 
     def _interpolate(self, start, between):
-        """Poses (n, 4, 4) at the nodes: `start` (stations, 4, 4) continued by fractions of `between` (stations, 6)."""
-        return start[self.left] @ se3.exp_pose(self.fraction * between[self.right] * (self.right > self.left)[:, None])
+        """Poses (n, 4, 4) at the nodes: `start` (stations, 4, 4) continued by fractions of `between`
+        (stations, 6)."""
+        return start[self.left] @ se3.exp_pose(
+            self.fraction * between[self.right] * (self.right > self.left)[:, None]
+        )
 
     def motions(self, positions):
-        """Rigid motions (stations, 4, 4) that carry the undeformed stations' material closest to `positions` (n, 3)."""
+        """Rigid motions (stations, 4, 4) that carry the undeformed stations' material closest to `positions`
+        (n, 3)."""
         X, x = self.nodes[: self.owned], positions[: self.owned]
         outer = np.einsum("ni,nj->nij", X, x).reshape(-1, 9)
         sums = self._sum_over_stations(np.hstack([np.ones((len(X), 1)), X, x, outer]))
@@ -62,14 +70,17 @@ class RodCoordinates:
         latest = relative[-1]
         logs = [se3.log_pose(se3.inverse_pose(latest) @ h) for h in relative]
         predicted = latest @ se3.exp_pose(sum(c * q for c, q in zip(coefficients, logs)))
-        local = sum(c * _apply(se3.inverse_pose(self.sections(x)), x) for c, x in zip(coefficients, histories))
+        local = sum(
+            c * _apply(se3.inverse_pose(self.sections(x)), x) for c, x in zip(coefficients, histories)
+        )
         return _apply(self._interpolate(_chain(predicted), se3.log_pose(predicted)), local)
 
     def retract(self, positions, increment):
         """Positions (n, 3) after a displacement increment (n, 3), equal to their sum to first order.
 
-        V(s): spatial twist that fits the increment at the stations, linear between them. The motion M of the sections
-        obeys M' = M hat(V'), so M_(i+1) = M_i exp(V_(i+1) - V_i): relative motions are integrated exactly.
+        V(s): spatial twist that fits the increment at the stations, linear between them. The motion M of the
+        sections obeys M' = M hat(V'), so M_(i+1) = M_i exp(V_(i+1) - V_i): relative motions are integrated
+        exactly.
         """
         x, d = positions[: self.owned], increment[: self.owned]
         scale = max(np.abs(self.comm.allreduce(np.abs(positions).max(initial=0.0), op=MPI.MAX)), 1e-300)

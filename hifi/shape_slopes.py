@@ -1,8 +1,10 @@
-"""Derivatives of a cell's free states by its shape: of the strains and of the stiffness, along geometry.shape_numbers.DIRECTIONS.
+"""Derivatives of a cell's free states by its shape: of the strains and of the stiffness, along
+geometry.shape_numbers.DIRECTIONS.
 
-The mesh moves with the shape (geometry.morph), so that its own error hardly enters. At a free state R(x, q; s) = 0, x the unknowns
-and multipliers and q the strains; the residual and the second derivatives are differenced along s, all the rest is solved exactly
-with the tangent that is factorised there (direct sensitivity analysis; e.g. Choi & Kim, Structural Sensitivity Analysis, 2005):
+The mesh moves with the shape (geometry.morph), so that its own error hardly enters. At a free state R(x, q;
+s) = 0, x the unknowns and multipliers and q the strains; the residual and the second derivatives are
+differenced along s, all the rest is solved exactly with the tangent that is factorised there (direct
+sensitivity analysis; e.g. Choi & Kim, Structural Sensitivity Analysis, 2005):
     dq = -C^-1 (R_q' - A^T R_x'),  dx = -K^-1 R_x' - A dq,  A = K^-1 R_xq,  C = R_qq - R_xq^T A
     dC = Z^T (dH along s, x and q) Z,  Z = (-A, 1), H all second derivatives.
 """
@@ -31,8 +33,9 @@ class ShapeSlopes:
         problem.placement = kept
 
     def of(self, system, stiffness=True):
-        """(slopes of the strains (d, 6), of CellState.stiffness (d, 6, 6) or None) by the d directions at a free state of `system`, a
-        CellSystem that has just been factorised there. mm, N, and normal pitches or degrees."""
+        """(slopes of the strains (d, 6), of CellState.stiffness (d, 6, 6) or None) by the d directions at a
+        free state of `system`, a CellSystem that has just been factorised there. mm, N, and normal pitches or
+        degrees."""
         problem, state, home = self.problem, system.state.copy(), self.problem.placement
         inner, slope = self._residual(state)
         rates = []
@@ -61,7 +64,9 @@ class ShapeSlopes:
         problem, n = self.problem, self.problem.unknowns
         forces, slope = problem.residual()
         u, multipliers, q = state[:n], state[n:-6], state[-6:]
-        inner = np.concatenate([forces + problem.gauge @ multipliers, problem.gauge.T @ u + problem.gauge_strains @ q])
+        inner = np.concatenate(
+            [forces + problem.gauge @ multipliers, problem.gauge.T @ u + problem.gauge_strains @ q]
+        )
         return inner, slope + problem.gauge_strains.T @ multipliers
 
     def _second_derivatives(self, Z):

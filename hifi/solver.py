@@ -31,9 +31,11 @@ class DirectSolver:
         self.ksp.setOperators(self.matrix)
         pc.setFactorSetUpSolverType()
         factor = pc.getFactorMatrix()
-        factor.setMumpsIcntl(7, 5)  # metis, where this MUMPS has it; Debian 12 takes its own choice (PORD) all the same
+        # metis, where this MUMPS has it; Debian 12 takes its own choice (PORD) all the same
+        factor.setMumpsIcntl(7, 5)
         if self.symmetric:
-            factor.setMumpsIcntl(12, 2)  # ordering of the graph compressed by 2x2 pivots: 7 % fewer operations
+            # ordering of the graph compressed by 2x2 pivots: 7 % fewer operations
+            factor.setMumpsIcntl(12, 2)
         factor.setMumpsIcntl(14, 60)  # workspace for pivoting, in percent
         factor.setMumpsIcntl(24, 1)  # a singular pivot is told, not a crash
         if self.symmetric and self.comm.size > 1:
@@ -44,7 +46,8 @@ class DirectSolver:
         return self.matrix.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
 
     def factorise(self):
-        if self._count() != self._nonzeros:  # for a new pattern PETSc makes a new factor, without what was set above
+        # for a new pattern PETSc makes a new factor, without what was set above
+        if self._count() != self._nonzeros:
             self.ksp.destroy()
             self._set_up()
         self.ksp.setOperators(self.matrix)

@@ -1,6 +1,7 @@
 """Adaptive load steps along an equilibrium path. Knows nothing of the physics it steps.
 
-The stepper asks its `path` object to predict and to correct at a load, and is told how many iterations that took.
+The stepper asks its `path` object to predict and to correct at a load, and is told how many iterations that
+took.
 """
 
 import time
@@ -38,7 +39,8 @@ class Step:
 
 @dataclass
 class StepResult:
-    """Accepted steps, failed attempts (load, why), why it ended, and what the path says about that (its diagnosis)."""
+    """Accepted steps, failed attempts (load, why), why it ended, and what the path says about that (its
+    diagnosis)."""
 
     steps: list = field(default_factory=list)
     failures: list = field(default_factory=list)
@@ -61,11 +63,11 @@ def lagrange_coefficients(known, wanted):
 def run_steps(path, target, size, on_step=lambda step: None, before=None):
     """Drive `path` from its current load to `target`; return a StepResult.
 
-    path.parameter, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path restored to
-    its last accepted state, path.diagnosis() -> words on why it cannot go on. `on_step(step)` is called after each accepted
-    step (hooks write results there).
-    `before`: the last Step of a run that this one continues; its numbers, seconds and step size go on. Raises
-    ConvergenceError, with the StepResult as its `result`, when steps fall below size.smallest.
+    path.parameter, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path
+    restored to its last accepted state, path.diagnosis() -> words on why it cannot go on. `on_step(step)` is
+    called after each accepted step (hooks write results there). `before`: the last Step of a run that this
+    one continues; its numbers, seconds and step size go on. Raises ConvergenceError, with the StepResult as
+    its `result`, when steps fall below size.smallest.
     """
     result = StepResult()
     milestones = sorted({m for m in size.milestones if path.parameter < m < target} | {target})
@@ -76,7 +78,11 @@ def run_steps(path, target, size, on_step=lambda step: None, before=None):
         remaining = milestones[0] - path.parameter
         step = min(step, size.largest)  # which on_step may have changed
         # hit the milestone exactly, and never leave a sliver of a step before it
-        load = milestones[0] if step > 0.999 * remaining else path.parameter + (step if step < 0.6 * remaining else remaining / 2)
+        load = (
+            milestones[0]
+            if step > 0.999 * remaining
+            else path.parameter + (step if step < 0.6 * remaining else remaining / 2)
+        )
         attempted = load - path.parameter
         try:
             iterations, factorisations, residual = path.advance(load)
@@ -87,10 +93,13 @@ def run_steps(path, target, size, on_step=lambda step: None, before=None):
                 result.failures.append((load, str(error)))
             if step < size.smallest:
                 result.reason, result.diagnosis = str(error), path.diagnosis()
-                why = result.diagnosis or "a limit point (ballooning), touching walls or a coarse mesh are the usual causes"
+                why = (
+                    result.diagnosis
+                    or "a limit point (ballooning), touching walls or a coarse mesh are the usual causes"
+                )
                 failure = ConvergenceError(
-                    f"stopped at load {path.parameter:.6g}: the next step of {attempted:.2g} did not converge ({error}); "
-                    f"results up to there are kept; {why}"
+                    f"stopped at load {path.parameter:.6g}: the next step of {attempted:.2g} did not converge"
+                    f" ({error}); results up to there are kept; {why}"
                 )
                 failure.result = result
                 raise failure from None
@@ -102,7 +111,9 @@ def run_steps(path, target, size, on_step=lambda step: None, before=None):
         elif iterations > 2 * size.target_iterations:
             step = max(attempted * 0.7, size.smallest)
         number += 1
-        accepted = Step(number, load, iterations, factorisations, residual, time.perf_counter() - started, step)
+        accepted = Step(
+            number, load, iterations, factorisations, residual, time.perf_counter() - started, step
+        )
         result.steps.append(accepted)
         on_step(accepted)
     return result

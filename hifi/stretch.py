@@ -6,7 +6,8 @@ from mpi4py import MPI
 
 from hifi import compat
 
-#: the 4-point rule of degree 2 on the reference tetrahedron (inside the cell: vertices of re-entrant corners are singular)
+#: the 4-point rule of degree 2 on the reference tetrahedron (inside the cell: vertices of re-entrant corners
+#: are singular)
 _A, _B = 0.5854101966249685, 0.1381966011250105
 POINTS = np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]])
 
@@ -17,7 +18,9 @@ class PrincipalStretch:
     def __init__(self, problem, cells=None):
         self.problem, mesh = problem, problem.mesh
         self._gradient = compat.expression(mesh, problem.deformation_gradient, POINTS)
-        self._cells = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32) if cells is None else cells
+        self._cells = (
+            np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32) if cells is None else cells
+        )
         space = problem.displacement_space
         self._nodes = compat.cell_dofs(space)[self._cells]
         self._sum = fem.Function(space)
@@ -33,7 +36,8 @@ class PrincipalStretch:
         return float(self.problem.mesh.comm.allreduce(values.max(initial=0.0), op=MPI.MAX))
 
     def _add_up(self, cell_values):
-        """(local P2 nodes,) sum over the cells around each node; carried by the first displacement component."""
+        """(local P2 nodes,) sum over the cells around each node; carried by the first displacement
+        component."""
         self._sum.x.array[:] = 0.0
         nodal = self._sum.x.array.reshape(-1, 3)[:, 0]
         np.add.at(nodal, self._nodes.ravel(), np.repeat(cell_values, self._nodes.shape[1]))

@@ -1,4 +1,5 @@
-"""`pneunet study`: cells, segments or manipulators over a list or grid of anything in them; one table and one picture."""
+"""`pneunet study`: cells, segments or manipulators over a list or grid of anything in them; one table and one
+picture."""
 
 import time
 from collections import Counter
@@ -20,19 +21,35 @@ LEVELS = "levels.csv"
 
 
 def run_study(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False):
-    """Compute the cases of STUDY.toml that are not finished in `directory`; collective. Returns the Study and the StudyTable.
+    """Compute the cases of STUDY.toml that are not finished in `directory`; collective. Returns the Study and
+    the StudyTable.
 
-    directory gets study.csv (a row a case and pressure level, rewritten after every case), study.png, run.json and
-    cases/NAME. retry: see hifi.cases.run_cases. InputError on bad input before anything is computed.
+    directory gets study.csv (a row a case and pressure level, rewritten after every case), study.png,
+    run.json and cases/NAME. retry: see hifi.cases.run_cases. InputError on bad input before anything is
+    computed.
     """
-    say, directory, started = say if comm.rank == 0 else (lambda text: None), Path(directory), time.perf_counter()
+    say, directory, started = (
+        say if comm.rank == 0 else (lambda text: None),
+        Path(directory),
+        time.perf_counter(),
+    )
     study = on_rank_0(comm, lambda: read_study(path))
     on_rank_0(comm, lambda: output_directory(directory) and None)
     for text in _announcement(study, comm.size):
         say(text)
     table = StudyTable(study, directory)
-    records = run_cases([c.case for c in study.cases if c.case], directory / "cases", study.limits, comm, say, table.add, retry)
-    on_rank_0(comm, lambda: _finish(study, table, records, directory, comm.size, time.perf_counter() - started, say))
+    records = run_cases(
+        [c.case for c in study.cases if c.case],
+        directory / "cases",
+        study.limits,
+        comm,
+        say,
+        table.add,
+        retry,
+    )
+    on_rank_0(
+        comm, lambda: _finish(study, table, records, directory, comm.size, time.perf_counter() - started, say)
+    )
     return study, table
 
 
@@ -59,19 +76,27 @@ def _finish(study, table, records, directory, ranks, seconds, say):
     write_record(directory, kind=study.kind, **facts, ranks=ranks, wall_seconds=seconds)
     summary = ", ".join(f"{number} {status}" for status, number in counts.items())
     if overlapping:
-        summary += f"; {overlapping} OVERLAP, without a contact model, at their higher pressures (columns {', '.join(MARKS)})"
-    say(f"{summary}; table in {directory / 'study.csv'}" + (f", picture {directory / 'study.png'}" if picture else ""))
+        summary += (
+            f"; {overlapping} OVERLAP, without a contact model, at their higher pressures (columns"
+            f" {', '.join(MARKS)})"
+        )
+    say(
+        f"{summary}; table in {directory / 'study.csv'}"
+        + (f", picture {directory / 'study.png'}" if picture else "")
+    )
 
 
 class StudyTable:
-    """study.csv: for each case that is known one row a pressure level, or one without levels. In order of the study."""
+    """study.csv: for each case that is known one row a pressure level, or one without levels. In order of the
+    study."""
 
     def __init__(self, study, directory):
         self.study, self.directory = study, Path(directory)
         self._known = {}  # case name -> (record, [{column: text} of a level])
 
     def add(self, case, record):
-        """Take a record with what levels.csv of the case says; rewrites study.csv. InputError when that cannot be written."""
+        """Take a record with what levels.csv of the case says; rewrites study.csv. InputError when that
+        cannot be written."""
         path = self.directory / "cases" / case.name / LEVELS
         header, rows = read_csv(path) if path.exists() else ([], [])
         self._known[case.name] = (record, [dict(zip(header, row)) for row in rows])
@@ -90,7 +115,9 @@ class StudyTable:
 
     def write(self):
         study = self.study
-        columns = list(dict.fromkeys(name for _, levels in self._known.values() for level in levels for name in level))
+        columns = list(
+            dict.fromkeys(name for _, levels in self._known.values() for level in levels for name in level)
+        )
         rows = []
         for case in study.cases:
             known = self.of(case)
@@ -100,14 +127,19 @@ class StudyTable:
             varied = [value_of(name, case) for name in study.variables]
             ending = [record["status"], record["reason"], record["seconds"], record["peak_memory_MB"]]
             name = case.case.name if case.case else ""
-            rows += [[name, *varied, *(level.get(c, "") for c in columns), *ending] for level in levels or [{}]]
+            rows += [
+                [name, *varied, *(level.get(c, "") for c in columns), *ending] for level in levels or [{}]
+            ]
         # a varied pressure is the case's top pressure; the level's has the plain name
         named = [f"top_{name}" if name in columns else name for name in study.variables]
         try:
             write_csv(
-                self.directory / "study.csv", ["case", *named, *columns, "status", "reason", "case_seconds", "case_memory_MB"], rows
+                self.directory / "study.csv",
+                ["case", *named, *columns, "status", "reason", "case_seconds", "case_memory_MB"],
+                rows,
             )
         except OSError as error:
             raise InputError(
-                f"{self.directory}: cannot be written to ({error.strerror or error}): make room there and start the study again"
+                f"{self.directory}: cannot be written to ({error.strerror or error}): make room there and"
+                " start the study again"
             ) from None

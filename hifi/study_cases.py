@@ -1,7 +1,9 @@
-"""What a study computes: the functions that hifi.cases runs in a process of their own, one for each kind of body.
+"""What a study computes: the functions that hifi.cases runs in a process of their own, one for each kind of
+body.
 
-Both leave levels.csv in the case's folder, a row for each pressure level as it is reached, so that a case that is ended half
-way keeps what it had; and the cell.toml or design.toml with which the single case is run by hand.
+Both leave levels.csv in the case's folder, a row for each pressure level as it is reached, so that a case
+that is ended half way keeps what it had; and the cell.toml or design.toml with which the single case is run
+by hand.
 """
 
 import json
@@ -47,7 +49,8 @@ def solve_cell_case(inputs, directory):
 
 
 def solve_design_case(inputs, directory):
-    """One manipulator: `inputs` are {"design": the tables of a design.toml, "levels": number of equal pressure steps}."""
+    """One manipulator: `inputs` are {"design": the tables of a design.toml, "levels": number of equal
+    pressure steps}."""
     design = design_from_tables(inputs["design"], "the case")
     write_design(directory / "design.toml", design)
     marks = np.linspace(0.0, design.pressure, inputs["levels"] + 1)
@@ -89,7 +92,8 @@ def _finite(distance):
 
 
 def _body(state, breaks_at, marks):
-    """What cells and manipulators tell alike, and a word on what makes the row doubtful; marks: {column of hifi.touch.MARKS: bool}."""
+    """What cells and manipulators tell alike, and a word on what makes the row doubtful; marks: {column of
+    hifi.touch.MARKS: bool}."""
     warnings = {
         **{name.replace("_", " "): holds for name, holds in marks.items()},
         "stretched beyond break": state.largest_stretch > breaks_at,

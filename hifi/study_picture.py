@@ -17,12 +17,19 @@ PER_M = 1e3
 LEGEND_LIMIT = 12
 STYLES = ("-", "--", ":", "-.")
 #: levels that are marked
-OVERLAP = {"linestyle": "", "marker": "o", "markersize": 7, "markerfacecolor": "none", "markeredgecolor": "#c92a2a"}
+OVERLAP = {
+    "linestyle": "",
+    "marker": "o",
+    "markersize": 7,
+    "markerfacecolor": "none",
+    "markeredgecolor": "#c92a2a",
+}
 MARKERS = ("", "o", "s", "^")
 
 
 def draw(study, table, path):
-    """Draw the levels of a StudyTable to `path`: colour tells the first variable, line and marker the others. False: no levels."""
+    """Draw the levels of a StudyTable to `path`: colour tells the first variable, line and marker the others.
+    False: no levels."""
     from matplotlib.figure import Figure
 
     cases = [(case, *known) for case in study.cases if (known := table.of(case)) and known[1]]
@@ -36,7 +43,10 @@ def draw(study, table, path):
     for row, prefix in zip(axes, prefixes):
         for ax, (column, label) in zip(row, PANELS):
             for case, record, levels in cases:
-                x, y = (np.array([float(level[name]) for level in levels]) for name in ("pressure_kPa", prefix + column))
+                x, y = (
+                    np.array([float(level[name]) for level in levels])
+                    for name in ("pressure_kPa", prefix + column)
+                )
                 ax.plot(x, PER_M * y, **looks.of(case))
                 overlapping = [marked(level) for level in levels]
                 ax.plot(x[overlapping], PER_M * y[overlapping], **OVERLAP)
@@ -75,7 +85,11 @@ class _Looks:
         return f"C{self.values.index(value) % 10}"
 
     def _line(self, number):
-        return {"linestyle": STYLES[number % len(STYLES)], "marker": MARKERS[number // len(STYLES) % len(MARKERS)], "markersize": 4}
+        return {
+            "linestyle": STYLES[number % len(STYLES)],
+            "marker": MARKERS[number // len(STYLES) % len(MARKERS)],
+            "markersize": 4,
+        }
 
     def of(self, case):
         number = self.combinations.index(self._combination(case))
@@ -89,18 +103,26 @@ class _Looks:
         handles = []
         if self.numeric and len(self.values) > LEGEND_LIMIT:
             low, high = min(self.values), max(self.values)
-            colours = LinearSegmentedColormap.from_list("values", [self._colour(v) for v in np.linspace(low, high, 64)])
+            colours = LinearSegmentedColormap.from_list(
+                "values", [self._colour(v) for v in np.linspace(low, high, 64)]
+            )
             quantity, unit = _split(self.variable)
             label = f"{quantity} ({unit})" if unit else quantity
-            figure.colorbar(ScalarMappable(Normalize(low, high), colours), ax=axes, label=label, fraction=0.02)
+            figure.colorbar(
+                ScalarMappable(Normalize(low, high), colours), ax=axes, label=label, fraction=0.02
+            )
         else:
-            handles += [Line2D([], [], color=self._colour(v), label=_told(self.variable, v)) for v in self.values]
+            handles += [
+                Line2D([], [], color=self._colour(v), label=_told(self.variable, v)) for v in self.values
+            ]
         if len(self.combinations) > 1:
             for number, combination in enumerate(self.combinations[: len(STYLES) * len(MARKERS)]):
                 label = ", ".join(_told(name, value) for name, value in zip(self.others, combination))
                 handles.append(Line2D([], [], color="0.3", label=label, **self._line(number)))
         if some_stopped:
-            handles.append(Line2D([], [], color="black", marker="x", linestyle="", label="ended before its top pressure"))
+            handles.append(
+                Line2D([], [], color="black", marker="x", linestyle="", label="ended before its top pressure")
+            )
         if some_overlap:
             handles.append(Line2D([], [], label="overlap (no contact model)", **OVERLAP))
         figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9)

@@ -1,7 +1,8 @@
 """STUDY.toml: one body and what is varied in it, spread out into the cases of hifi.cases.
 
-A variable is a path into the tables of the body, `segment.2.angle_deg` or `material.mu_MPa`; the parameters of segments and
-materials are known by their bare names too. So whatever a CELL.toml or design.toml can say can be varied.
+A variable is a path into the tables of the body, `segment.2.angle_deg` or `material.mu_MPa`; the parameters
+of segments and materials are known by their bare names too. So whatever a CELL.toml or design.toml can say
+can be varied.
 """
 
 import copy
@@ -21,7 +22,9 @@ from hifi.cellfile import cell_from_tables, cell_tables
 
 KINDS = ("cell", "segment", "manipulator")
 SEGMENT_KEYS = [file_key(f) for f in fields(Segment) if "unit" in f.metadata]
-MATERIAL_KEYS = ["silicone", "law"] + sorted({file_key(f) for law in LAWS.values() for f in fields(law)} - {"name", "source"})
+MATERIAL_KEYS = ["silicone", "law"] + sorted(
+    {file_key(f) for law in LAWS.values() for f in fields(law)} - {"name", "source"}
+)
 #: keys which say what a material is: the table that stood there before means nothing any more
 NAMES_OF_MATERIALS = ("silicone", "law")
 #: values at the top of a design.toml and of a CELL.toml, and at that of the latter alone
@@ -34,7 +37,8 @@ DEFAULT_TIME = 3600.0
 
 @dataclass(frozen=True)
 class StudyCase:
-    """One row of the list or grid: {variable as the user wrote it: value}, its case, or why there can be none."""
+    """One row of the list or grid: {variable as the user wrote it: value}, its case, or why there can be
+    none."""
 
     values: dict
     case: Case | None
@@ -58,10 +62,14 @@ class Study:
 def read_study(path):
     """The Study in a TOML file; InputError that names key and fix otherwise.
 
-    A combination of the grid that is no valid body is kept with its refusal, a listed case or a whole grid of them is an error.
+    A combination of the grid that is no valid body is kept with its refusal, a listed case or a whole grid of
+    them is an error.
     """
     data, where = read_toml(path), str(path)
-    for key, fix in (("kind", "write 'cell', 'segment' or 'manipulator'"), ("base", 'write the body as [base], or base = "FILE.toml"')):
+    for key, fix in (
+        ("kind", "write 'cell', 'segment' or 'manipulator'"),
+        ("base", 'write the body as [base], or base = "FILE.toml"'),
+    ):
         if key not in data:
             raise InputError(f"{where}: key '{key}' is missing: {fix}")
     refuse_unknown(data, ["kind", "base", "levels", "limits", "grid", "case"], where)
@@ -94,7 +102,9 @@ def _base(base, kind, path):
     segment = base["segment"]
     single = isinstance(segment, dict)
     if kind == "cell" and not single:
-        raise InputError(f"{path} [base]: a cell has one segment: write [base.segment], or kind = 'manipulator'")
+        raise InputError(
+            f"{path} [base]: a cell has one segment: write [base.segment], or kind = 'manipulator'"
+        )
     if kind == "segment" and not single and len(segment) != 1:
         raise InputError(f"{path} [base]: {len(segment)} segments: write kind = 'manipulator'")
     if kind != "cell" and single:
@@ -111,13 +121,20 @@ def _varied(data, base, where):
     grid = _flat(as_table(data.get("grid", {}), f"{where} [grid]"))
     if not grid and "case" not in data:
         raise InputError(f"{where}: nothing is varied: write [grid] with key = [values], or [[case]] tables")
-    known = [*SEGMENT_KEYS, *MATERIAL_KEYS, *(COMMON_KEYS if isinstance(base["segment"], list) else CELL_KEYS)]
+    known = [
+        *SEGMENT_KEYS,
+        *MATERIAL_KEYS,
+        *(COMMON_KEYS if isinstance(base["segment"], list) else CELL_KEYS),
+    ]
     for table, name in [(row, f"[[case]] {i}") for i, row in enumerate(listed, start=1)] + [(grid, "[grid]")]:
         bare = {key: value for key, value in table.items() if "." not in key and key not in base}
         refuse_unknown(bare, known, f"{where} {name}")
     for key, values in grid.items():
         if not isinstance(values, list) or not values:
-            raise InputError(f"{where} [grid]: {key} = {values!r} must be a list of values: write {key} = [{values!r}, ...]")
+            raise InputError(
+                f"{where} [grid]: {key} = {values!r} must be a list of values: write {key} = [{values!r},"
+                " ...]"
+            )
         if key in listed[0]:
             raise InputError(f"{where} [grid]: '{key}' is in the list of cases too: leave it out of one")
     return listed, grid
@@ -151,9 +168,14 @@ def _inputs(kind, base, levels, values, where):
         try:
             _put(tables, _path(name), values[name])
         except (AttributeError, TypeError, ValueError):
-            raise InputError(f"{where}: '{name}' leads nowhere in the body; segments are counted from 1, segment.1.angle_deg") from None
+            raise InputError(
+                f"{where}: '{name}' leads nowhere in the body; segments are counted from 1,"
+                " segment.1.angle_deg"
+            ) from None
     if kind == "cell":
-        return "hifi.study_cases:solve_cell_case", cell_tables(cell_from_tables({**tables, "levels": levels}, where))
+        return "hifi.study_cases:solve_cell_case", cell_tables(
+            cell_from_tables({**tables, "levels": levels}, where)
+        )
     design = design_from_tables(tables, where)
     return "hifi.study_cases:solve_design_case", {"design": design_tables(design), "levels": levels}
 
@@ -167,7 +189,11 @@ def _path(name):
 def _put(table, path, value):
     """Set what `path` leads to; a list of tables is entered by a number from 1, or in all its tables."""
     if isinstance(table, list):
-        chosen, rest = ([table[range(1, len(table) + 1).index(int(path[0]))]], path[1:]) if path[0].isdigit() else (table, path)
+        chosen, rest = (
+            ([table[range(1, len(table) + 1).index(int(path[0]))]], path[1:])
+            if path[0].isdigit()
+            else (table, path)
+        )
         for each in chosen:
             _put(each, rest, value)
     elif path[0].isdigit():

@@ -13,10 +13,11 @@ for _opposite in range(4):
 
 
 def facet_nodes(problem, *tags):
-    """(facets, 6) displacement nodes of the tagged facets on this rank, corners ordered so that normals point out.
+    """(facets, 6) displacement nodes of the tagged facets on this rank, corners ordered so that normals point
+    out.
 
-    A facet between two cells is seen from that with the lower tag: the body's. It is reported by the rank that owns its
-    cell, so that sums over ranks count it once.
+    A facet between two cells is seen from that with the lower tag: the body's. It is reported by the rank
+    that owns its cell, so that sums over ranks count it once.
     """
     topology = problem.mesh.topology
     topology.create_connectivity(2, 3)
@@ -51,18 +52,24 @@ def reference_areas(problem, facets):
 
 # degree-4 rule on the triangle (Dunavant 1985): exact for P2 shape functions times linear coordinates
 _A4, _B4 = 0.445948490915965, 0.091576213509771
-_BARYCENTRIC = np.array([[1 - 2 * a if i == j else a for i in range(3)] for a in (_A4, _B4) for j in range(3)])
+_BARYCENTRIC = np.array(
+    [[1 - 2 * a if i == j else a for i in range(3)] for a in (_A4, _B4) for j in range(3)]
+)
 _WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 
 
 def p2_shape(barycentric):
-    """(..., 6) quadratic shape functions at barycentric coordinates (..., 3); corners, then mid-edges 01, 12, 20."""
+    """(..., 6) quadratic shape functions at barycentric coordinates (..., 3); corners, then mid-edges 01, 12,
+    20."""
     a, b, c = np.moveaxis(barycentric, -1, 0)
-    return np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=-1)
+    return np.stack(
+        [a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=-1
+    )
 
 
 def subdivision(divisions):
-    """(divisions^2, 3, 6) quadratic shape functions at the corners of a facet's flat parts, of its own orientation."""
+    """(divisions^2, 3, 6) quadratic shape functions at the corners of a facet's flat parts, of its own
+    orientation."""
     n = divisions
     up = [[(i, j), (i + 1, j), (i, j + 1)] for i in range(n) for j in range(n - i)]
     down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i in range(n) for j in range(n - i - 1)]
@@ -71,12 +78,14 @@ def subdivision(divisions):
 
 
 def subdivided(facets, divisions):
-    """(facets divisions^2, 3, 3) flat triangles between points of quadratic facets (facets, 6, 3), same orientation."""
+    """(facets divisions^2, 3, 3) flat triangles between points of quadratic facets (facets, 6, 3), same
+    orientation."""
     return np.einsum("tcn,fni->ftci", subdivision(divisions), facets).reshape(-1, 3, 3)
 
 
 def _clip(polygon, values, keep_below):
-    """The part of a barycentric polygon (n, 3) where corner `values` (3,), taken linearly, are <= 0 (or >= 0)."""
+    """The part of a barycentric polygon (n, 3) where corner `values` (3,), taken linearly, are <= 0 (or >=
+    0)."""
     sign = 1.0 if keep_below else -1.0
     out = []
     for p, q in zip(polygon, np.roll(polygon, -1, axis=0)):
@@ -120,13 +129,15 @@ class SlabIntegral:
                 np.add.at(self.first, row, np.einsum("q,qi,qn->ni", w, X, N))
 
     def moments(self, positions):
-        """(16,) moments of the rigid fit from the undeformed surface to nodal `positions` (all local nodes, 3)."""
+        """(16,) moments of the rigid fit from the undeformed surface to nodal `positions` (all local nodes,
+        3)."""
         x = positions[self.nodes]
         return np.concatenate([[self.area], self.centre, self.weights @ x, (self.first.T @ x).ravel()])
 
 
 class FaceQuadrature:
-    """Integrals over a tagged face of quantities that depend on the deformed position; weights are reference areas."""
+    """Integrals over a tagged face of quantities that depend on the deformed position; weights are reference
+    areas."""
 
     def __init__(self, problem, tag):
         self.comm = problem.mesh.comm
@@ -135,23 +146,29 @@ class FaceQuadrature:
         self._shape = p2_shape(_BARYCENTRIC)
 
     def moments(self, positions):
-        """(area, centre (3,), central second moment (3, 3) in mm^4) of the face at nodal `positions` (all local nodes, 3)."""
+        """(area, centre (3,), central second moment (3, 3) in mm^4) of the face at nodal `positions` (all
+        local nodes, 3)."""
         x = np.einsum("qn,fni->fqi", self._shape, positions[self._facets])
         w = self._weights
-        sums = np.concatenate([[w.sum()], np.einsum("fq,fqi->i", w, x), np.einsum("fq,fqi,fqj->ij", w, x, x).ravel()])
+        sums = np.concatenate(
+            [[w.sum()], np.einsum("fq,fqi->i", w, x), np.einsum("fq,fqi,fqj->ij", w, x, x).ravel()]
+        )
         sums = self.comm.allreduce(sums)
         area, centre = sums[0], sums[1:4] / sums[0]
         return area, centre, sums[4:].reshape(3, 3) - area * np.outer(centre, centre)
 
     def traction(self, positions, force, moment):
-        """(spread, spin, centre), each (3,): the traction spread + spin x (x - centre) has this force (N), and this moment (N mm)
-        about the face's present centre."""
+        """(spread, spin, centre), each (3,): the traction spread + spin x (x - centre) has this force (N),
+        and this moment (N mm) about the face's present centre."""
         area, centre, second = self.moments(positions)
-        spin = np.linalg.solve(np.trace(second) * np.eye(3) - second, moment) if np.any(moment) else np.zeros(3)
+        spin = (
+            np.linalg.solve(np.trace(second) * np.eye(3) - second, moment) if np.any(moment) else np.zeros(3)
+        )
         return np.asarray(force) / area, spin, centre
 
     def forces(self, positions, spread, spin, centre):
-        """(local nodes, 3) nodal forces in N of the traction spread + spin x (x - centre), MPa; this rank's facets only."""
+        """(local nodes, 3) nodal forces in N of the traction spread + spin x (x - centre), MPa; this rank's
+        facets only."""
         x = np.einsum("qn,fni->fqi", self._shape, positions[self._facets])
         traction = spread + np.cross(spin, x - centre)
         out = np.zeros_like(positions)

@@ -1,8 +1,10 @@
-"""Do parts of a body run into each other? What a state says about it, and the load at which a path met it first.
+"""Do parts of a body run into each other? What a state says about it, and the load at which a path met it
+first.
 
-Two kinds: the facing *walls* of neighbouring chambers (hifi.walls), which a run with a contact model keeps apart, and *the body*
-itself: coils or segments that are far apart along it (hifi.body_distance), which no run models. A state beyond first touch is marked
-for good: what came out of an overlap is not trusted again when the distance grows.
+Two kinds: the facing *walls* of neighbouring chambers (hifi.walls), which a run with a contact model keeps
+apart, and *the body* itself: coils or segments that are far apart along it (hifi.body_distance), which no run
+models. A state beyond first touch is marked for good: what came out of an overlap is not trusted again when
+the distance grows.
 """
 
 from dataclasses import dataclass
@@ -31,10 +33,12 @@ class Load:
 
 @dataclass(frozen=True)
 class Touch:
-    """A state: smallest signed distances (mm) of facing walls and of parts far apart along the body, inf where there are none.
+    """A state: smallest signed distances (mm) of facing walls and of parts far apart along the body, inf
+    where there are none.
 
-    walls_from, body_from: the Load at which they were first met on the way here, None while they were not. contact: the walls are
-    held apart by a contact model, so that their touching is no overlap; contact_force: the largest between two walls, N.
+    walls_from, body_from: the Load at which they were first met on the way here, None while they were not.
+    contact: the walls are held apart by a contact model, so that their touching is no overlap; contact_force:
+    the largest between two walls, N.
     """
 
     wall_distance: float = np.inf
@@ -66,18 +70,24 @@ class Touch:
     def text(self):
         """What the last line of a run says, "" where nothing overlaps."""
         told = [f"WALLS OVERLAP from {self.walls_from} on, without contact"] * self.walls_overlap
-        told += [f"PARTS OF THE BODY OVERLAP from {self.body_from} on, which is not modelled"] * self.body_overlap
+        told += [
+            f"PARTS OF THE BODY OVERLAP from {self.body_from} on, which is not modelled"
+        ] * self.body_overlap
         return "; ".join(told)
 
     def news(self, before):
         """Sentences on what this state has met and the one `before` it had not."""
         if self.walls_from and not before.walls_from:
-            then = "held apart by contact" if self.contact else "contact is not modelled, states from here on are marked 'walls overlap'"
+            then = (
+                "held apart by contact"
+                if self.contact
+                else "contact is not modelled, states from here on are marked 'walls overlap'"
+            )
             yield f"walls of neighbouring chambers touch at {self.walls_from}: {then}"
         if self.body_from and not before.body_from:
             yield (
-                f"parts of the body that are far apart along it touch at {self.body_from}: this is not modelled, states from here on "
-                "are marked 'body overlap'"
+                f"parts of the body that are far apart along it touch at {self.body_from}: this is not"
+                " modelled, states from here on are marked 'body overlap'"
             )
 
     def table(self):
@@ -104,13 +114,18 @@ class TouchWatch:
         self.contact, self._walls, self._body = contact, _Crossing(), _Crossing()
 
     def see(self, load, wall_distance, body_distance=np.inf, contact_force=0.0):
-        """The Touch of the state at a Load; the same state may be seen again. Walls that push at each other touch, however close."""
-        walls, body = self._walls.see(load, np.nan if contact_force > 0 else wall_distance), self._body.see(load, body_distance)
+        """The Touch of the state at a Load; the same state may be seen again. Walls that push at each other
+        touch, however close."""
+        walls, body = (
+            self._walls.see(load, np.nan if contact_force > 0 else wall_distance),
+            self._body.see(load, body_distance),
+        )
         return Touch(wall_distance, body_distance, walls, body, self.contact, contact_force)
 
 
 class _Crossing:
-    """The Load at which a distance passes zero for the first time; nan: it has, and contact keeps it from showing."""
+    """The Load at which a distance passes zero for the first time; nan: it has, and contact keeps it from
+    showing."""
 
     def __init__(self):
         self._known, self.met = [], None
@@ -126,12 +141,12 @@ class _Crossing:
 
 
 def first_zero(loads, distances):
-    """(k,) loads at which the distance passes zero between the last two of loads (n, k), distances (n,), of which the last is <= 0,
-    or nan where walls in contact push at each other.
+    """(k,) loads at which the distance passes zero between the last two of loads (n, k), distances (n,), of
+    which the last is <= 0, or nan where walls in contact push at each other.
 
-    Interpolated by the parabola through the last three where that stays between the last two, else by their chord. In contact
-    extrapolated from the three before, within the last step; where these are no three that close, the last load, which is near: no step
-    is taken across a deep overlap (hifi.path).
+    Interpolated by the parabola through the last three where that stays between the last two, else by their
+    chord. In contact extrapolated from the three before, within the last step; where these are no three that
+    close, the last load, which is near: no step is taken across a deep overlap (hifi.path).
     """
     loads, distances = np.asarray(loads, float), np.asarray(distances, float)
     if len(loads) == 1:

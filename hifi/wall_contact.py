@@ -1,11 +1,14 @@
-"""Contact without friction between two walls that face each other: a penalty on what lies behind the other wall's surface.
+"""Contact without friction between two walls that face each other: a penalty on what lies behind the other
+wall's surface.
 
-Both walls are sheets of quadratic facets, seen along a fixed direction d from the first wall towards the second. There each is a
-height over the plane normal to d, and the gap at a point x of one wall is the height of the other's surface X(xi) over it,
+Both walls are sheets of quadratic facets, seen along a fixed direction d from the first wall towards the
+second. There each is a height over the plane normal to d, and the gap at a point x of one wall is the height
+of the other's surface X(xi) over it,
     g = d . (X - x),   X - x parallel to d,   dg = m . (dX - dx),   m = n / (n . d),  n the surface's normal.
-There is no closest-point projection, which jumps. Near a facet's edge, where n jumps, the gaps over the facets that meet there
-(each continued a little beyond its edge) are blended, so that forces are continuous and the gradient of an energy. Each wall is
-held against the other at its own Gauss points, both with half the stiffness, so that neither is preferred.
+There is no closest-point projection, which jumps. Near a facet's edge, where n jumps, the gaps over the
+facets that meet there (each continued a little beyond its edge) are blended, so that forces are continuous
+and the gradient of an energy. Each wall is held against the other at its own Gauss points, both with half the
+stiffness, so that neither is preferred.
 """
 
 from dataclasses import dataclass
@@ -31,9 +34,11 @@ DEEPEST = 0.1
 
 @dataclass(frozen=True)
 class WallPenalty:
-    """pressure (MPa) between walls over their overlap (mm): `stiffness` mu / gap, of the body's mu and the gap at rest.
+    """pressure (MPa) between walls over their overlap (mm): `stiffness` mu / gap, of the body's mu and the
+    gap at rest.
 
-    At an air pressure of 0.3 mu the overlap is 0.75 % of the gap. The pressure rises smoothly over `onset` of the gap, either side.
+    At an air pressure of 0.3 mu the overlap is 0.75 % of the gap. The pressure rises smoothly over `onset` of
+    the gap, either side.
     """
 
     stiffness: float = 40.0
@@ -62,12 +67,13 @@ class PenaltyLaw:
 
 @dataclass(frozen=True)
 class Touching:
-    """Points of one wall that push at another. A point lies under one facet, or between several: each is a pair of it.
+    """Points of one wall that push at another. A point lies under one facet, or between several: each is a
+    pair of it.
 
-    Per point (n,): overlap (mm), area (mm2, undeformed, with the share of this side), energy (N/mm), pressure (MPa), slope
-    (MPa/mm); position, normal (n, 3): the point (mm) and the covector m; name (n, 2): facet of this wall and Gauss point on it.
-    Per pair (c,): point, facet of this wall, other of the other wall; gradient (c, 12, 3) of the gap by the six nodes of both, bend
-    (c, 36, 36) its second derivative in 1/mm.
+    Per point (n,): overlap (mm), area (mm2, undeformed, with the share of this side), energy (N/mm), pressure
+    (MPa), slope (MPa/mm); position, normal (n, 3): the point (mm) and the covector m; name (n, 2): facet of
+    this wall and Gauss point on it. Per pair (c,): point, facet of this wall, other of the other wall;
+    gradient (c, 12, 3) of the gap by the six nodes of both, bend (c, 36, 36) its second derivative in 1/mm.
     """
 
     overlap: np.ndarray
@@ -106,8 +112,9 @@ def mean_normal(facets):
 
 
 def touching(points, areas, wall, direction, law, share=0.5):
-    """The Touching of the Gauss points of facets `points` (n, 6, 3) in mm, undeformed areas (n,) in mm2, on the `wall` (m, 6, 3) that
-    lies in `direction` (3,); None where nothing comes closer than the law's onset. share: of the contact that this side carries."""
+    """The Touching of the Gauss points of facets `points` (n, 6, 3) in mm, undeformed areas (n,) in mm2, on
+    the `wall` (m, 6, 3) that lies in `direction` (3,); None where nothing comes closer than the law's onset.
+    share: of the contact that this side carries."""
     if not len(points) or not len(wall) or not (np.isfinite(points).all() and np.isfinite(wall).all()):
         return None  # a state that has diverged has a residual that says so
     heights = wall @ direction
@@ -150,13 +157,27 @@ def touching(points, areas, wall, direction, law, share=0.5):
     np.add.at(normals, point, part[:, None] * m)
     own = facet[point]
     return Touching(
-        *(-mean[kept], share * areas[facet[kept]] * surface._WEIGHTS[gauss[kept]], *law(-mean[kept]), position[kept], normals[kept]),
-        *(np.searchsorted(kept, point), own, other, gradient, part[:, None, None] * bend, np.stack([facet[kept], gauss[kept]], axis=1)),
+        *(
+            -mean[kept],
+            share * areas[facet[kept]] * surface._WEIGHTS[gauss[kept]],
+            *law(-mean[kept]),
+            position[kept],
+            normals[kept],
+        ),
+        *(
+            np.searchsorted(kept, point),
+            own,
+            other,
+            gradient,
+            part[:, None, None] * bend,
+            np.stack([facet[kept], gauss[kept]], axis=1),
+        ),
     )
 
 
 def _blend(xi):
-    """(c,) share of a facet in the gap at its coordinates xi (c, 2), before all shares are made to add up to one; (c, 2) its slope."""
+    """(c,) share of a facet in the gap at its coordinates xi (c, 2), before all shares are made to add up to
+    one; (c, 2) its slope."""
     t = np.clip((_full(xi) + _BLEND) / (2 * _BLEND), 0.0, 1.0)
     value, slope = t * t * (3 - 2 * t), 6 * t * (1 - t) / (2 * _BLEND)
     a, b, c = value.T
@@ -165,7 +186,8 @@ def _blend(xi):
 
 
 def _bend(weights, m, dN, tangents, nodes, plane):
-    """(n, 2, 36): dxi such that X stays over the point; (n, 36, 36): d2g = m . (X,ab dxi_a dxi_b + 2 N,a dX dxi_a)."""
+    """(n, 2, 36): dxi such that X stays over the point; (n, 36, 36): d2g = m . (X,ab dxi_a dxi_b + 2 N,a dX
+    dxi_a)."""
     n = len(m)
     # dxi = Z dx: the plane's components of N dX - dx vanish with X,a dxi_a
     A = np.linalg.inv(np.einsum("pi,cai->cpa", plane, tangents))
@@ -183,7 +205,8 @@ def _full(xi):
 
 
 def _slopes(xi):
-    """(..., 2, 6) derivatives of the quadratic shape functions by the last two barycentric coordinates xi (..., 2)."""
+    """(..., 2, 6) derivatives of the quadratic shape functions by the last two barycentric coordinates xi
+    (..., 2)."""
     a, (b, c) = 1 - xi.sum(axis=-1), np.moveaxis(xi, -1, 0)
     zero = np.zeros_like(a)
     by_b = [1 - 4 * a, 4 * b - 1, zero, 4 * (a - b), 4 * c, -4 * c]
@@ -192,11 +215,14 @@ def _slopes(xi):
 
 
 #: (2, 2, 6) second derivatives of the quadratic shape functions
-_SECOND = np.array([[[4, 4, 0, -8, 0, 0], [4, 0, 0, -4, 4, -4]], [[4, 0, 0, -4, 4, -4], [4, 0, 4, 0, 0, -8]]], float)
+_SECOND = np.array(
+    [[[4, 4, 0, -8, 0, 0], [4, 0, 0, -4, 4, -4]], [[4, 0, 0, -4, 4, -4], [4, 0, 4, 0, 0, -8]]], float
+)
 
 
 def _under(points, facets):
-    """Pairs (c,) of points (n, 2) and facets (m, 6, 2) they lie over, or just beside: point, facet, coordinates xi (c, 2)."""
+    """Pairs (c,) of points (n, 2) and facets (m, 6, 2) they lie over, or just beside: point, facet,
+    coordinates xi (c, 2)."""
     count = min(_CANDIDATES, len(facets))
     near = cKDTree(facets[:, :3].mean(axis=1)).query(points, k=count)[1].reshape(len(points), count)
     nodes = facets[near]

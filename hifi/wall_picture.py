@@ -13,7 +13,8 @@ KPA = 1e3
 
 
 def draw_cell(problem, state, path, pitches=PITCHES):
-    """Write the picture of a hifi.cell_system.CellState of a hifi.cell.CellProblem to `path` (PNG); False without gaps.
+    """Write the picture of a hifi.cell_system.CellState of a hifi.cell.CellProblem to `path` (PNG); False
+    without gaps.
 
     The problem's own state is as before. Needs pyvista and matplotlib.
     """
@@ -32,24 +33,32 @@ def draw_cell(problem, state, path, pitches=PITCHES):
     if not facing.any():
         return False
     turns = problem.segment.pitch * (np.arange(pitches) - (pitches - 1) / 2)
-    rest, moved = (np.concatenate(x) for x in zip(*(_positions(problem, state, facets, turn) for turn in turns)))
+    rest, moved = (
+        np.concatenate(x) for x in zip(*(_positions(problem, state, facets, turn) for turn in turns))
+    )
     body = _mesh(rest)
     body.point_data["moved"] = _fine(moved)
-    body = body.clean(tolerance=1e-6, absolute=True)  # facets share their points, so that only real edges are edges
+    # facets share their points, so that only real edges are edges
+    body = body.clean(tolerance=1e-6, absolute=True)
     lines, _ = edges(body)
     for mesh in (body, lines):
         mesh.points = mesh.point_data["moved"]
     walls = _mesh(moved[np.tile(facing, pitches)])
     walls.point_data[FIELD] = np.tile(_fine(of_facets[facing][..., None])[:, 0], pitches)
     gap, contact = problem.segment.gap, state.contact is not None
-    told = f"walls overlap by {-state.wall_distance:.2f} mm" if state.walls_overlap else f"walls {state.wall_distance:.3f} mm apart"
+    told = (
+        f"walls overlap by {-state.wall_distance:.2f} mm"
+        if state.walls_overlap
+        else f"walls {state.wall_distance:.3f} mm apart"
+    )
     title = f"{state.pressure * KPA:.4g} kPa, {'' if contact else 'no '}contact: {told}"
     draw_walls(path, body, lines, walls, gap, title, TOUCHING * gap if contact else 0.0)
     return True
 
 
 def node_distances(walls, array):
-    """(nodes,) signed distances (mm) from the wall opposite, of the displacement nodes on the walls of a CellWalls; nan elsewhere."""
+    """(nodes,) signed distances (mm) from the wall opposite, of the displacement nodes on the walls of a
+    CellWalls; nan elsewhere."""
     out = np.full(len(walls.problem.nodes), np.nan)
     for pair in walls.gaps:
         placed = [walls.positions(wall, array) for wall in pair]
@@ -59,7 +68,8 @@ def node_distances(walls, array):
 
 
 def _positions(problem, state, facets, shift):
-    """(rest, deformed) positions (facets, 6, 3) in mm of the facets of the pitch that lies `shift` mm further along the body."""
+    """(rest, deformed) positions (facets, 6, 3) in mm of the facets of the pitch that lies `shift` mm further
+    along the body."""
     X = problem.nodes[facets] + [shift, 0, 0]
     screw = se3.exp_pose(np.concatenate([state.strains.k, state.strains.e]) * X[..., :1])
     local = X * [0, 1, 1] + problem.displacement(state.array)[facets]

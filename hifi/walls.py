@@ -1,7 +1,8 @@
-"""Distance between the walls that face each other across the gaps of a segment, or of the unit cell, where one wall of a
-gap is the screw-periodic image of the other chamber's.
+"""Distance between the walls that face each other across the gaps of a segment, or of the unit cell, where
+one wall of a gap is the screw-periodic image of the other chamber's.
 
-Signed, between the deformed surfaces: negative = overlap, a point of one wall lies behind the other wall's surface.
+Signed, between the deformed surfaces: negative = overlap, a point of one wall lies behind the other wall's
+surface.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,8 @@ IN_CONTACT = 0.1
 
 @dataclass(frozen=True)
 class WallContact:
-    """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm) met there.
+    """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm)
+    met there.
 
     gamma: stiffness of the medium that transmits it, over the body's; nan without one.
     """
@@ -72,7 +74,8 @@ class WallDistances:
         return np.concatenate(parts) if self.comm.rank == 0 else None
 
     def distances(self, array=None):
-        """(gaps,) signed smallest distances in mm, on rank 0 (None elsewhere); inf where a gap has no walls."""
+        """(gaps,) signed smallest distances in mm, on rank 0 (None elsewhere); inf where a gap has no
+        walls."""
         each = self.at_nodes(array)
         if each is None:
             return None
@@ -81,7 +84,8 @@ class WallDistances:
         return out.reshape(-1, 2).min(axis=1)
 
     def at_nodes(self, array=None):
-        """(facets of all walls, 6) signed distances (mm) of their nodes from the wall that they face, on rank 0 (None elsewhere)."""
+        """(facets of all walls, 6) signed distances (mm) of their nodes from the wall that they face, on rank
+        0 (None elsewhere)."""
         positions = self._gather(self.problem.nodes + self.problem.displacement(array))
         if self.comm.rank != 0:
             return None
@@ -96,15 +100,16 @@ class WallDistances:
         return out
 
     def node_numbers(self, numbers):
-        """(facets of all walls, 6) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes` has them."""
+        """(facets of all walls, 6) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes`
+        has them."""
         return self._gather(numbers)
 
 
 class CellWalls:
     """The walls of a cell's gaps, put together from the pieces that its cuts leave.
 
-    gaps: a pair of walls for each side of the body, the second facing the first across the gap; each is (facets (n, 6) of
-    nodes, shift (n,) in mm, whole pitches that bring a piece to its wall).
+    gaps: a pair of walls for each side of the body, the second facing the first across the gap; each is
+    (facets (n, 6) of nodes, shift (n,) in mm, whole pitches that bring a piece to its wall).
     """
 
     def __init__(self, problem):
@@ -147,19 +152,30 @@ class CellWalls:
         rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
         forces = np.einsum("...ij,...j->...i", rotation, self.problem.contact_forces()[facets]).reshape(-1, 3)
         # a node of a cut lies on both sides of it, with a share of the force on each
-        _, first, inverse = np.unique(np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True)
+        _, first, inverse = np.unique(
+            np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True
+        )
         forces, x = forces[first], self.positions(gap[0]).reshape(-1, 3)[first]
         shares = np.outer(surface.reference_areas(self.problem, facets), [0, 0, 0, 1 / 3, 1 / 3, 1 / 3])
         areas = np.bincount(inverse.ravel(), shares.ravel())
         total = np.linalg.norm(forces.sum(axis=0))
-        touching = (areas > 0) & (forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas)
+        touching = (areas > 0) & (
+            forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas
+        )
         distances = distances_from(self.positions(other), x)[touching]
         nearest, farthest = (distances.min(), distances.max()) if len(distances) else (np.nan, np.nan)
-        return WallContact(float(total), float(areas[touching].sum()), float(nearest), float(farthest), self.problem.medium.gamma)
+        return WallContact(
+            float(total),
+            float(areas[touching].sum()),
+            float(nearest),
+            float(farthest),
+            self.problem.medium.gamma,
+        )
 
 
 def wall_distance(points, wall):
-    """Smallest signed distance (mm) of the nodes of quadratic facets `points` (n, 6, 3) from the wall (m, 6, 3)."""
+    """Smallest signed distance (mm) of the nodes of quadratic facets `points` (n, 6, 3) from the wall (m, 6,
+    3)."""
     return float(distances_from(wall, np.unique(points.reshape(-1, 3), axis=0)).min())
 
 
@@ -183,7 +199,8 @@ def distances_from(wall, points):
 
 
 def closest_point(point, triangle):
-    """Points (..., 3) of triangles (..., 3, 3) closest to points (..., 3); Ericson, Real-Time Collision Detection, 5.1.5."""
+    """Points (..., 3) of triangles (..., 3, 3) closest to points (..., 3); Ericson, Real-Time Collision
+    Detection, 5.1.5."""
     a, b, c = triangle[..., 0, :], triangle[..., 1, :], triangle[..., 2, :]
     ab, ac = b - a, c - a
     d1, d2 = _dot(ab, point - a), _dot(ac, point - a)

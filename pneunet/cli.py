@@ -1,7 +1,7 @@
 """The command line: each link of the chain is a sub-command, and an importable function behind it.
 
-Exit codes: 0 done; 2 bad input, a load that could not be reached or too little memory (one line on standard error, under MPI from one
-rank); anything else is a bug and shows its traceback.
+Exit codes: 0 done; 2 bad input, a load that could not be reached or too little memory (one line on standard
+error, under MPI from one rank); anything else is a bug and shows its traceback.
 """
 
 import argparse
@@ -31,7 +31,9 @@ def pressures(text):
         try:
             value = float(word)
         except ValueError:
-            raise argparse.ArgumentTypeError(f"'{word}' is not a number; write for instance 10,20,30") from None
+            raise argparse.ArgumentTypeError(
+                f"'{word}' is not a number; write for instance 10,20,30"
+            ) from None
         if not 0 < value <= 2000:
             raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..2000 kPa")
         values.append(value * 1e-3)
@@ -74,7 +76,10 @@ def strain_percent(text):
 
 
 def parser():
-    top = Parser(prog="pneunet", description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.")
+    top = Parser(
+        prog="pneunet",
+        description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.",
+    )
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
 
     def add(name, function, text):
@@ -83,13 +88,25 @@ def parser():
         return command
 
     def add_law(command, default):
-        text = f"trained (the rod law that comes along), analytic, or the .npz of pneunet train; default: {default or 'as designed'}"
+        text = (
+            "trained (the rod law that comes along), analytic, or the .npz of pneunet train; default:"
+            f" {default or 'as designed'}"
+        )
         command.add_argument("--law", default=default, metavar="LAW", help=text)
 
     def add_outside(command):
-        command.add_argument("--outside", choices=("warn", "refuse"), default="warn", help="where the law doubts the design; default: warn")
+        command.add_argument(
+            "--outside",
+            choices=("warn", "refuse"),
+            default="warn",
+            help="where the law doubts the design; default: warn",
+        )
 
-    c = add("design", run_design, "inverse design: target curve (CSV or TOML) -> design.toml, centreline.csv, design.png")
+    c = add(
+        "design",
+        run_design,
+        "inverse design: target curve (CSV or TOML) -> design.toml, centreline.csv, design.png",
+    )
     c.add_argument("target", type=Path)
     add_law(c, "trained")
     add_outside(c)
@@ -113,54 +130,143 @@ def parser():
     c.add_argument("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
 
-    c = add("solve", run_solve, "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml")
+    c = add(
+        "solve",
+        run_solve,
+        "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml",
+    )
     c.add_argument("design", type=Path)
-    c.add_argument("--pressure-kPa", type=one_pressure, dest="pressure", help="default: the design's; 0: its [loads] alone")
+    c.add_argument(
+        "--pressure-kPa",
+        type=one_pressure,
+        dest="pressure",
+        help="default: the design's; 0: its [loads] alone",
+    )
     c.add_argument("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     c.add_argument("--no-fields", action="store_true", help="write no ParaView files")
-    c.add_argument("--resume", action="store_true", help="go on from the last accepted step of a run that was ended, on any ranks")
+    c.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on from the last accepted step of a run that was ended, on any ranks",
+    )
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the design's folder")
 
-    c = add("cell", run_cell, "one pitch of a long segment: strains, volume and rod stiffness over pressure, or at given strains")
+    c = add(
+        "cell",
+        run_cell,
+        "one pitch of a long segment: strains, volume and rod stiffness over pressure, or at given strains",
+    )
     c.add_argument("cell", type=Path, metavar="CELL.toml")
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: the file's folder")
 
-    c = add("study", run_study, "cells, segments or manipulators over a grid or a list; on MPI ranks: pneunet run -n 3 study STUDY.toml")
+    c = add(
+        "study",
+        run_study,
+        "cells, segments or manipulators over a grid or a list; on MPI ranks: pneunet run -n 3 study"
+        " STUDY.toml",
+    )
     c.add_argument("study", type=Path, metavar="STUDY.toml")
-    c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
-    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the study; finished cases there are kept")
+    c.add_argument(
+        "--retry", action="store_true", help="compute again what crashed, ran out of time or memory"
+    )
+    c.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="default: out/NAME of the study; finished cases there are kept",
+    )
 
-    c = add("campaign", run_campaign, "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml")
+    c = add(
+        "campaign",
+        run_campaign,
+        "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml",
+    )
     c.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml")
-    c.add_argument("--extend", type=Path, metavar="DATA.npz", help="a data set whose cases are taken over, not computed again")
-    c.add_argument("--retry", action="store_true", help="compute again what crashed, ran out of time or memory")
-    c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/NAME of the campaign; finished cases there are kept")
+    c.add_argument(
+        "--extend",
+        type=Path,
+        metavar="DATA.npz",
+        help="a data set whose cases are taken over, not computed again",
+    )
+    c.add_argument(
+        "--retry", action="store_true", help="compute again what crashed, ran out of time or memory"
+    )
+    c.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="default: out/NAME of the campaign; finished cases there are kept",
+    )
 
     c = add("suggest", run_suggest, "further designs for a campaign: those that would teach the rod law most")
     c.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml")
     c.add_argument("--kind", choices=("one-sided", "twisting"), required=True)
     c.add_argument("-n", "--number", type=whole, default=100, metavar="100", help="how many; default: 100")
-    c.add_argument("--of", type=whole, default=2000, metavar="2000", help="of how many designs that follow in the sample; default: 2000")
-    c.add_argument("--touching", action="store_true", help="by the bending stiffness of cells whose walls touch, not by the free strains")
-    c.add_argument("--law", default="trained", metavar="LAW.npz", help="of pneunet train; default: the one that comes along")
+    c.add_argument(
+        "--of",
+        type=whole,
+        default=2000,
+        metavar="2000",
+        help="of how many designs that follow in the sample; default: 2000",
+    )
+    c.add_argument(
+        "--touching",
+        action="store_true",
+        help="by the bending stiffness of cells whose walls touch, not by the free strains",
+    )
+    c.add_argument(
+        "--law",
+        default="trained",
+        metavar="LAW.npz",
+        help="of pneunet train; default: the one that comes along",
+    )
 
     c = add("train", run_train, "the rod law from a data set of cells, with its errors on held-out designs")
     c.add_argument("data", type=Path, metavar="DATA.npz")
-    c.add_argument("--like", type=Path, metavar="LAW.npz", help="keep the metrics and noises of this law: for data that have grown")
-    c.add_argument("--no-comparison", action="store_true", help="leave out the other laws and the learning curve")
     c.add_argument(
-        "-o", "--output", type=Path, metavar="LAW.npz", help="default: law.npz beside the data; tables get the same name with .md"
+        "--like",
+        type=Path,
+        metavar="LAW.npz",
+        help="keep the metrics and noises of this law: for data that have grown",
+    )
+    c.add_argument(
+        "--no-comparison", action="store_true", help="leave out the other laws and the learning curve"
+    )
+    c.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="LAW.npz",
+        help="default: law.npz beside the data; tables get the same name with .md",
     )
 
-    c = add("report", run_report, "one HTML page: target, reduced prediction and finite elements side by side")
+    c = add(
+        "report", run_report, "one HTML page: target, reduced prediction and finite elements side by side"
+    )
     c.add_argument("directory", type=Path)
     add_law(c, None)
 
-    c = add("fit-material", run_fit_material, "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
+    c = add(
+        "fit-material",
+        run_fit_material,
+        "fit a material law to a tensile test (CSV) -> material.toml, fit.png",
+    )
     c.add_argument("test", type=Path, metavar="TENSILE.csv")
-    c.add_argument("--law", default="all", help="neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them")
+    c.add_argument(
+        "--law",
+        default="all",
+        help="neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them",
+    )
     c.add_argument("--stress-unit", help="where the file names none: MPa, kPa, Pa, psi")
-    c.add_argument("--to-strain-percent", type=strain_percent, default=math.inf, metavar="200", help="fit no further than this")
+    c.add_argument(
+        "--to-strain-percent",
+        type=strain_percent,
+        default=math.inf,
+        metavar="200",
+        help="fit no further than this",
+    )
     c.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: out/fit-NAME of the test")
 
     c = add("run", run_ranks, "start a pneunet command (or, after --, any program) on N MPI ranks")
@@ -192,7 +298,14 @@ def run_shape(a):
     from reduced.choice import choose_law
 
     top = read_design(a.design).pressure
-    work(a.design, a.pressures or [top * i / 5 for i in range(1, 6)], design_folder(a), say, choose_law(a.law), a.outside)
+    work(
+        a.design,
+        a.pressures or [top * i / 5 for i in range(1, 6)],
+        design_folder(a),
+        say,
+        choose_law(a.law),
+        a.outside,
+    )
 
 
 def run_mesh(a):
@@ -212,7 +325,9 @@ def run_solve(a):
     design = read_design(a.design)
     from hifi.manipulator_run import solve_design
 
-    solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume)
+    solve_design(
+        design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume
+    )
 
 
 def run_cell(a):
@@ -244,7 +359,9 @@ def run_suggest(a):
     campaign, law = read_campaign(a.campaign), choose_law(a.law)
     known = getattr(law, "kinds", {})
     if a.kind not in known or a.kind not in campaign.kinds:
-        raise InputError(f"--kind {a.kind}: {a.campaign if a.kind in known else f'--law {a.law}'} does not know it")
+        raise InputError(
+            f"--kind {a.kind}: {a.campaign if a.kind in known else f'--law {a.law}'} does not know it"
+        )
     offered = on_offer(campaign, a.kind, a.of)
     shape = np.array([shape_numbers(segment) for _, segment in offered])
     top, share = (campaign.table[key] for key in ("top_pressure", "limit_share"))
@@ -257,7 +374,9 @@ def run_train(a):
 
     with rank_map() as mapping:
         if mapping:  # other ranks have worked for this one
-            run_training(a.data, a.output or a.data.with_name("law.npz"), say, not a.no_comparison, mapping, a.like)
+            run_training(
+                a.data, a.output or a.data.with_name("law.npz"), say, not a.no_comparison, mapping, a.like
+            )
 
 
 def run_report(a):
@@ -295,8 +414,8 @@ def main(arguments=None):
         a = parser().parse_args(arguments)
         return a.function(a) or 0
     except (InputError, ConvergenceError, MemoryError) as error:
-        # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with it
-        # what rank 0 still has to say, at the first failure
+        # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with
+        # it what rank 0 still has to say, at the first failure
         if all(os.environ.get(name, "0") == "0" for name in RANK_VARIABLES):
             print(f"pneunet: {error}", file=sys.stderr, flush=True)
         else:

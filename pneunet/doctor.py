@@ -34,11 +34,16 @@ VERSIONS = {
     "numpy": "import numpy; print(numpy.__version__, 'in', numpy.__path__[0])",
     "scipy": "import scipy; print(scipy.__version__)",
     "mpi4py": "import mpi4py; print(mpi4py.__version__)",
-    "MPI library": "from mpi4py import MPI; print(MPI.Get_library_version().splitlines()[0].split(', package')[0])",
+    "MPI library": (
+        "from mpi4py import MPI; print(MPI.Get_library_version().splitlines()[0].split(', package')[0])"
+    ),
     "petsc4py": "import petsc4py; print(petsc4py.__version__)",
     "PETSc": "from petsc4py import PETSc; print('.'.join(map(str, PETSc.Sys.getVersion())))",
     # the distribution's name changed between the releases
-    "ufl": ("import ufl; from importlib.metadata import packages_distributions as names, version\nprint(version(names()['ufl'][0]))"),
+    "ufl": (
+        "import ufl; from importlib.metadata import packages_distributions as names,"
+        " version\nprint(version(names()['ufl'][0]))"
+    ),
     "basix": "import basix; print(basix.__version__)",
     "ffcx": "import ffcx; print(ffcx.__version__)",
     "dolfinx": "import dolfinx; print(dolfinx.__version__)",
@@ -56,7 +61,10 @@ SCALAR = (
     "assert np.dtype(PETSc.ScalarType) == np.float64, f'{np.dtype(PETSc.ScalarType)}, must be float64'\n"
     "print('float64 (real)')"
 )
-MUMPS = "from petsc4py import PETSc\nassert PETSc.Sys.hasExternalPackage('mumps'), 'PETSc without MUMPS'\nprint('in PETSc')"
+MUMPS = (
+    "from petsc4py import PETSc\nassert PETSc.Sys.hasExternalPackage('mumps'), 'PETSc without"
+    " MUMPS'\nprint('in PETSc')"
+)
 # The kernel's list of mapped files: the BLAS that is really loaded, all symbolic links resolved.
 BLAS = r"""
 from petsc4py import PETSc
@@ -81,9 +89,9 @@ DRAW = (
     "print(type(plotter.render_window).__name__)"
 )
 RANKS = (
-    "import sys; from pneunet import launch\n"
-    "code = 'from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)'\n"
-    "sys.exit(launch.run(2, ['--', sys.executable, '-c', code]))"
+    "import sys; from pneunet import launch\ncode = 'from mpi4py import MPI; c = MPI.COMM_WORLD; s ="
+    " c.allreduce(c.rank); c.rank or print(c.size, s)'\nsys.exit(launch.run(2, ['--', sys.executable, '-c',"
+    " code]))"
 )
 
 
@@ -91,7 +99,14 @@ def probe(code: str, **env: str) -> tuple[bool, str]:
     """Run Python code apart; (True, what it printed) or (False, the last line of what went wrong)."""
     command = [sys.executable, "-c", code]
     try:
-        done = subprocess.run(command, env={**os.environ, **env}, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120)
+        done = subprocess.run(
+            command,
+            env={**os.environ, **env},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
     except subprocess.TimeoutExpired:
         return False, "no answer within 120 s"
     if done.returncode == 0:
@@ -107,7 +122,10 @@ def check_blas() -> Finding:
     if not ok or not text:
         return Finding("BLAS", False, text or "no BLAS is loaded with PETSc", SETUP)
     if any("/blas/libblas" in path for path in text.split()):
-        fix = "apt-get install libopenblas0-serial; update-alternatives --auto libblas.so.3-$(gcc -print-multiarch)"
+        fix = (
+            "apt-get install libopenblas0-serial; update-alternatives --auto libblas.so.3-$(gcc"
+            " -print-multiarch)"
+        )
         return Finding("BLAS", False, f"{text} (reference BLAS, 4-5 times slower)", fix)
     return Finding("BLAS", True, text)
 
@@ -116,7 +134,9 @@ def check_threads() -> Finding:
     """One thread a rank: threads of BLAS beside MPI ranks only get in each other's way."""
     value = os.environ.get("OMP_NUM_THREADS")
     if value in (None, "1"):
-        return Finding("threads", True, f"OMP_NUM_THREADS={value or 'not set (pneunet run and make set it to 1)'}")
+        return Finding(
+            "threads", True, f"OMP_NUM_THREADS={value or 'not set (pneunet run and make set it to 1)'}"
+        )
     text = f"OMP_NUM_THREADS={value}: threads and ranks compete for the cores"
     return Finding("threads", False, text, "export OMP_NUM_THREADS=1", needed=False)
 
@@ -125,7 +145,10 @@ def check_ranks() -> Finding:
     """Two ranks add their numbers."""
     ok, text = probe(RANKS)
     if ok and text.split()[-2:] != ["2", "1"]:
-        ok, text = False, f"expected '2 1' from two ranks, got {text!r}: mpirun and mpi4py are of different MPIs"
+        ok, text = (
+            False,
+            f"expected '2 1' from two ranks, got {text!r}: mpirun and mpi4py are of different MPIs",
+        )
     return Finding("2 ranks", ok, "sum of ranks is right" if ok else text, SETUP)
 
 
@@ -136,13 +159,17 @@ def findings():
     for name, code in VERSIONS.items():
         yield Finding(name, *probe(code), SETUP)
     compiler = "apt-get install gcc libc6-dev python3-dev"
-    yield Finding("scalars", *probe(SCALAR), "apt-get install python3-petsc4py-real; unset PETSC_DIR PETSC_ARCH")
+    yield Finding(
+        "scalars", *probe(SCALAR), "apt-get install python3-petsc4py-real; unset PETSC_DIR PETSC_ARCH"
+    )
     yield Finding("MUMPS", *probe(MUMPS), SETUP)
     yield check_blas()
     with tempfile.TemporaryDirectory() as cache:  # an empty form cache, so that the compiler does run
         yield Finding("form compiler", *probe(COMPILE, XDG_CACHE_HOME=cache), compiler)
     window = {} if os.environ.get("DISPLAY") else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-    yield Finding("drawing", *probe(DRAW, **window), "apt-get install libegl1 libgl1-mesa-dri libx11-6 libxrender1")
+    yield Finding(
+        "drawing", *probe(DRAW, **window), "apt-get install libegl1 libgl1-mesa-dri libx11-6 libxrender1"
+    )
     yield check_ranks()
     yield check_threads()
 

@@ -54,9 +54,13 @@ def command_line(ranks: int, command: list[str]) -> list[str]:
     """The mpirun line. A command that starts with "--" is any program, else a sub-command of pneunet."""
     if ranks < 1:
         raise ValueError(f"the number of ranks must be at least 1, not {ranks}")
-    program = command[1:] if command[:1] == ["--"] else [str(Path(sys.executable).with_name("pneunet")), *command]
+    program = (
+        command[1:] if command[:1] == ["--"] else [str(Path(sys.executable).with_name("pneunet")), *command]
+    )
     if not program or not command:
-        raise ValueError("no command to run: pneunet run -n 2 solve DESIGN.toml, or pneunet run -n 2 -- PROGRAM ...")
+        raise ValueError(
+            "no command to run: pneunet run -n 2 solve DESIGN.toml, or pneunet run -n 2 -- PROGRAM ..."
+        )
     return ["mpirun", "-n", str(ranks), *program]
 
 
@@ -85,17 +89,22 @@ def run(ranks: int, command: list[str]) -> int:
     code = code if code >= 0 else 128 - code
     if 128 < code < 160:  # said here, since mpirun is told to be quiet
         why = " (out of memory?)" if code == 137 else ""
-        resume = "; the same command with --resume goes on from the last accepted step" if "solve" in command else ""
+        resume = (
+            "; the same command with --resume goes on from the last accepted step"
+            if "solve" in command
+            else ""
+        )
         print(f"pneunet run: a rank was stopped by signal {code - 128}{why}{resume}", file=sys.stderr)
     return code
 
 
 @contextmanager
 def rank_map():
-    """A `map` that spreads its calls over the MPI ranks when a launcher has started us, Python's own otherwise.
+    """A `map` that spreads its calls over the MPI ranks when a launcher has started us, Python's own
+    otherwise.
 
-    On ranks other than 0 it is None: they have done the work by the time the block is entered. Rank 0 hands out and computes
-    nothing itself.
+    On ranks other than 0 it is None: they have done the work by the time the block is entered. Rank 0 hands
+    out and computes nothing itself.
     """
     if not any(name in os.environ for name in RANK_VARIABLES):
         yield map

@@ -1,4 +1,5 @@
-"""What is fast: the rod, free and under load, and the laws that predict a manipulator's shape. numpy and scipy alone."""
+"""What is fast: the rod, free and under load, and the laws that predict a manipulator's shape. numpy and
+scipy alone."""
 
 from reduced.body import body_surface
 from reduced.centreline import Centreline, centreline, free_shapes

@@ -1,8 +1,8 @@
 """The deformed body in three dimensions (paper, Sec. II.B, Eqs 22-26, stretch included).
 
-Outline of the undeformed body - the core's box and the chambers' slanted blocks of each segment - carried by the
-section frames of a predicted centreline: the point (s, y, z) goes to c(s) + Q(s) (0, y, z)/sqrt(lambda), so that the
-solid keeps its volume. Chambers move with the sections; their swelling is not part of the rod.
+Outline of the undeformed body - the core's box and the chambers' slanted blocks of each segment - carried by
+the section frames of a predicted centreline: the point (s, y, z) goes to c(s) + Q(s) (0, y, z)/sqrt(lambda),
+so that the solid keeps its volume. Chambers move with the sections; their swelling is not part of the rod.
 """
 
 import numpy as np
@@ -12,14 +12,17 @@ from reduced.model import predict
 
 
 def _box(divisions):
-    """Surface of the unit cube: corners (n, 3) and quads (m, 4) turned outwards; divisions (3,) per direction."""
+    """Surface of the unit cube: corners (n, 3) and quads (m, 4) turned outwards; divisions (3,) per
+    direction."""
     points, quads, count = [], [], 0
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         nu, nv = divisions[u], divisions[v]
         grid_u, grid_v = np.meshgrid(np.linspace(0, 1, nu + 1), np.linspace(0, 1, nv + 1), indexing="ij")
         index = np.arange((nu + 1) * (nv + 1)).reshape(nu + 1, nv + 1)
-        face = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
+        face = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(
+            -1, 4
+        )
         for side in (0.0, 1.0):
             corners = np.empty((index.size, 3))
             corners[:, axis], corners[:, u], corners[:, v] = side, grid_u.ravel(), grid_v.ravel()
@@ -30,7 +33,8 @@ def _box(divisions):
 
 
 def segment_outline(segment, spacing=1.0):
-    """Undeformed outline of one segment from x = 0: vertices (n, 3) in mm and quads (m, 4), turned outwards."""
+    """Undeformed outline of one segment from x = 0: vertices (n, 3) in mm and quads (m, 4), turned
+    outwards."""
     s = segment
 
     def divisions(length):
@@ -57,8 +61,8 @@ def segment_outline(segment, spacing=1.0):
 def body_surface(manipulator, pressure, law, spacing=1.0, base_pose=None):
     """The deformed outline of a manipulator at `pressure` (MPa) by a SegmentLaw.
 
-    Returns vertices (n, 3) in mm, quads (m, 4) of vertex numbers, and the segment's index of each quad (m,). spacing:
-    edge length along the body, mm; base_pose (4, 4) as in `predict`.
+    Returns vertices (n, 3) in mm, quads (m, 4) of vertex numbers, and the segment's index of each quad (m,).
+    spacing: edge length along the body, mm; base_pose (4, 4) as in `predict`.
     """
     if not spacing > 0:
         raise InputError(f"spacing = {spacing:g} mm must be larger than 0")

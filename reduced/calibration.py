@@ -1,8 +1,9 @@
 """Fit the analytic models' constants to free states, as the paper fitted E_t to its experiments (Sec. III).
 
-`calibrate_tube`: E_t of the twisting tube, with the radii if wanted; fit each fibre convention and compare. A tube here is
-turned like a segment: tau > 0 for chambers of less than 90 degrees, its fibres at -angle.
-`calibrate_softness`: a factor on the pressure of the one-sided cell, which is one on 1/mu, and its growth with the slant.
+`calibrate_tube`: E_t of the twisting tube, with the radii if wanted; fit each fibre convention and compare. A
+tube here is turned like a segment: tau > 0 for chambers of less than 90 degrees, its fibres at -angle.
+`calibrate_softness`: a factor on the pressure of the one-sided cell, which is one on 1/mu, and its growth
+with the slant.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +22,8 @@ MODULI, RATIOS = np.geomspace(0.03, 30, 10), np.linspace(0.2, 0.9, 8)
 
 @dataclass(frozen=True)
 class TwistCurves:
-    """angles (n,) in degrees, pressures (m,) in MPa, increasing; tau in rad per mm of deformed length and stretch (n, m).
+    """angles (n,) in degrees, pressures (m,) in MPa, increasing; tau in rad per mm of deformed length and
+    stretch (n, m).
 
     nan: no state. tau > 0 for chambers of less than 90 degrees.
     """
@@ -34,8 +36,9 @@ class TwistCurves:
 
 @dataclass(frozen=True)
 class Calibration:
-    """tube: the TwistingTube found. tau_error, stretch_error: root mean squares of the errors of tau and of stretch - 1 over
-    the root mean squares of what was fitted; states that the tube does not have count as 1."""
+    """tube: the TwistingTube found. tau_error, stretch_error: root mean squares of the errors of tau and of
+    stretch - 1 over the root mean squares of what was fitted; states that the tube does not have count as 1.
+    """
 
     tube: TwistingTube
     tau_error: float
@@ -55,11 +58,12 @@ def tube_curves(tube, angles, pressures):
 
 
 def calibrate_tube(curves, start, radii=True):
-    """The Calibration of the tube nearest to `curves`; `start` gives mu, fractions, fibre convention and, without `radii`, those.
+    """The Calibration of the tube nearest to `curves`; `start` gives mu, fractions, fibre convention and,
+    without `radii`, those.
 
-    What is least is the sum of the squares of the two errors. tau of similar tubes goes with 1/size, so the size that serves
-    tau best is known in closed form for each E_t and Ri/Ro, and only those two are searched: on a grid, then by Nelder-Mead,
-    which does not mind the jumps where states are lost to a limit load.
+    What is least is the sum of the squares of the two errors. tau of similar tubes goes with 1/size, so the
+    size that serves tau best is known in closed form for each E_t and Ri/Ro, and only those two are searched:
+    on a grid, then by Nelder-Mead, which does not mind the jumps where states are lost to a limit load.
     """
 
     def candidate(x):
@@ -71,21 +75,32 @@ def calibrate_tube(curves, start, radii=True):
         tau, stretch = np.nan_to_num(found.tau), np.where(np.isnan(found.stretch), 1.0, found.stretch)
         overlap = (tau * curves.tau).sum()
         size = (tau**2).sum() / overlap if radii and overlap > 0 else 1.0
-        tube = replace(tube, inner_radius=float(size * tube.inner_radius), outer_radius=float(size * tube.outer_radius))
+        tube = replace(
+            tube, inner_radius=float(size * tube.inner_radius), outer_radius=float(size * tube.outer_radius)
+        )
         errors = (tau / size - curves.tau, curves.tau), (stretch - curves.stretch, curves.stretch - 1)
-        return Calibration(tube, *(float(np.linalg.norm(error) / np.linalg.norm(wanted)) for error, wanted in errors))
+        return Calibration(
+            tube, *(float(np.linalg.norm(error) / np.linalg.norm(wanted)) for error, wanted in errors)
+        )
 
     def cost(x):
         found = candidate(x)
         return np.inf if found is None else found.tau_error**2 + found.stretch_error**2
 
-    grid = [np.array([m, r]) for m in np.log(MODULI) for r in RATIOS] if radii else np.log(np.geomspace(*MODULI[[0, -1]], 30))[:, None]
-    best = minimize(cost, min(grid, key=cost), method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-8, "maxfev": 150})
+    grid = (
+        [np.array([m, r]) for m in np.log(MODULI) for r in RATIOS]
+        if radii
+        else np.log(np.geomspace(*MODULI[[0, -1]], 30))[:, None]
+    )
+    best = minimize(
+        cost, min(grid, key=cost), method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-8, "maxfev": 150}
+    )
     return candidate(best.x)
 
 
 def softened_curvature(segment, pressures, softness, slant=0.0):
-    """|k| (n,) in 1/mm of the one-sided cell at `softness` sin(angle)^-slant times the pressures (n,) in MPa; nan: no state."""
+    """|k| (n,) in 1/mm of the one-sided cell at `softness` sin(angle)^-slant times the pressures (n,) in MPa;
+    nan: no state."""
     cell, curvature = HelicalCell(segment), np.full(len(pressures), np.nan)
     try:
         for j, x in enumerate(states(cell, softness * segment.sin**-slant * np.asarray(pressures))):
@@ -96,7 +111,8 @@ def softened_curvature(segment, pressures, softness, slant=0.0):
 
 
 def calibrate_softness(segments, pressures, curvature, slanted=True):
-    """(softness, slant) for which `softened_curvature` is nearest to `curvature` (segments, pressures), in 1/mm.
+    """(softness, slant) for which `softened_curvature` is nearest to `curvature` (segments, pressures), in
+    1/mm.
 
     Relative errors in the least-squares sense, 1 where the cell has no state; slant 0 unless `slanted`.
     """

@@ -1,15 +1,15 @@
 """Kinematics of the one-sided cell: its unknowns, and the stretches and openings that are linear in them.
 
 xi across and eta along the chambers, in plan; z = 0 on the channel axis. The core is stretched in plan by
-A(z) = M + z K, and under the cavity by the opening (alpha + beta z) xi and the sliding (gamma + delta z) eta more than
-beside it, the mean over the pitch staying A(z). The long walls are clamped to the turning core at their feet and held
-by the top wall. See docs/theory-reduced.md.
+A(z) = M + z K, and under the cavity by the opening (alpha + beta z) xi and the sliding (gamma + delta z) eta
+more than beside it, the mean over the pitch staying A(z). The long walls are clamped to the turning core at
+their feet and held by the top wall. See docs/theory-reduced.md.
 """
 
 import numpy as np
 
-#: Unknowns of the section and of the chamber; the latter vary along the chamber with `along_shapes`. All are of order
-#: 1: K, beta and delta are multiplied by the core's height.
+#: Unknowns of the section and of the chamber; the latter vary along the chamber with `along_shapes`. All are
+#: of order 1: K, beta and delta are multiplied by the core's height.
 SECTION = ("M11", "M12", "M22", "K11", "K12", "K22", "gamma", "delta", "slide", "height")
 CHAMBER = ("alpha", "beta", "top", "corner", "bulge")
 UNKNOWNS = SECTION + tuple(f"{name}_{part}" for name in CHAMBER for part in ("end", "mid", "slope"))
@@ -20,7 +20,8 @@ SIZE = len(UNKNOWNS)
 def along_shapes(y):
     """Shapes of y = -1..1 along the chamber, with two derivatives: (derivative, shape, points).
 
-    The value at the ends, the excess in the middle (1 - y^2)^2, and y^2 (1 - y^2), which has a slope at the ends.
+    The value at the ends, the excess in the middle (1 - y^2)^2, and y^2 (1 - y^2), which has a slope at the
+    ends.
     """
     zero = np.zeros_like(y)
     y2 = y * y
@@ -36,9 +37,12 @@ def along_shapes(y):
 def wall_shapes(x):
     """Long wall's profiles of x = 0..1 from foot to top, with two derivatives: (derivative, profile, points).
 
-    Hermite cubics (displacement and slope at the foot, displacement and slope at the top) and the bulge 16 x^2 (1-x)^2.
+    Hermite cubics (displacement and slope at the foot, displacement and slope at the top) and the bulge 16
+    x^2 (1-x)^2.
     """
-    polynomials = np.array([[1, 0, -3, 2, 0], [0, 1, -2, 1, 0], [0, 0, 3, -2, 0], [0, 0, -1, 1, 0], [0, 0, 16, -32, 16]])
+    polynomials = np.array(
+        [[1, 0, -3, 2, 0], [0, 1, -2, 1, 0], [0, 0, 3, -2, 0], [0, 0, -1, 1, 0], [0, 0, 16, -32, 16]]
+    )
     powers = np.arange(5)
     value = x[None] ** powers[:, None]
     first = powers[:, None] * x[None] ** np.maximum(powers - 1, 0)[:, None]
@@ -49,8 +53,8 @@ def wall_shapes(x):
 class CellKinematics:
     """Linear forms of the unknowns, as rows (..., SIZE), for a one-sided Segment.
 
-    z in mm is an array (n,); shapes (3, m) are `along_shapes` at m stations of the chamber or their derivatives, and
-    rows depend on (n, m). "Opening" and "sliding" are per cavity thickness: 1 and 0 at rest.
+    z in mm is an array (n,); shapes (3, m) are `along_shapes` at m stations of the chamber or their
+    derivatives, and rows depend on (n, m). "Opening" and "sliding" are per cavity thickness: 1 and 0 at rest.
     """
 
     def __init__(self, segment):
@@ -87,7 +91,8 @@ class CellKinematics:
         return rows
 
     def gradient(self, z, shapes, part):
-        """F = A(z) + `part` of opening and sliding, in axes (xi, eta): rows (n, m, 4, SIZE) of F11, F21, F12, F22."""
+        """F = A(z) + `part` of opening and sliding, in axes (xi, eta): rows (n, m, 4, SIZE) of F11, F21, F12,
+        F22."""
         Z = np.asarray(z, float)[:, None] / self.core_height
         out = np.zeros(Z.shape[:1] + shapes.shape[1:] + (4, SIZE))
         out[..., INDEX["M11"] : INDEX["M22"] + 1] = shapes[0][:, None, None] * self.plan
@@ -110,7 +115,8 @@ class CellKinematics:
         return self.gradient(z, self.end[0], 1 - self.share)[:, 0, 1]
 
     def sliding(self, z):
-        """Sliding at heights z: above the foot linear up to the top wall's, as the long walls shear in their planes."""
+        """Sliding at heights z: above the foot linear up to the top wall's, as the long walls shear in their
+        planes."""
         x = ((z - self.foot) / self.wall_height)[:, None]
         free = (1 - x) * self.plane_sliding([self.foot]) + x * self.section("slide")
         return np.where(x > 0, free, self.plane_sliding(z))
@@ -122,7 +128,9 @@ class CellKinematics:
     def wall_amplitudes(self, shapes):
         """Coefficients of `wall_shapes` in units of the cavity's stretch: (profile, m, SIZE)."""
         foot, above = self.plane_opening([self.foot, self.foot + self.wall_height], shapes)
-        return np.stack([foot, above - foot] + [self.chamber(name, shapes) for name in ("top", "corner", "bulge")])
+        return np.stack(
+            [foot, above - foot] + [self.chamber(name, shapes) for name in ("top", "corner", "bulge")]
+        )
 
     def opening(self, z, shapes):
         """Stretch of the cavity across itself at heights z."""

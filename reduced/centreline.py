@@ -1,8 +1,9 @@
 """Rod kinematics on SE(3): section frames along a rod whose strains are constant on each piece.
 
-The frame (origin c, rotation Q) obeys c' = Q e, Q' = Q hat(k) per undeformed length, so over a piece it moves by the
-closed-form screw exp(s (k, e)), and the pieces follow one another by products. Frames, not tangents, are continuous at
-joints; with the paper's words (Eqs 22-26) the product of the pieces' end rotations turns the next piece.
+The frame (origin c, rotation Q) obeys c' = Q e, Q' = Q hat(k) per undeformed length, so over a piece it moves
+by the closed-form screw exp(s (k, e)), and the pieces follow one another by products. Frames, not tangents,
+are continuous at joints; with the paper's words (Eqs 22-26) the product of the pieces' end rotations turns
+the next piece.
 """
 
 from dataclasses import dataclass
@@ -54,7 +55,8 @@ class Centreline:
         return self.arc_length[-1]
 
     def at(self, s):
-        """Section frames (n, 4, 4) at any undeformed arc lengths s (n,) in mm on the rod: exact, not interpolated."""
+        """Section frames (n, 4, 4) at any undeformed arc lengths s (n,) in mm on the rod: exact, not
+        interpolated."""
         s = np.asarray(s, float)
         reach = self.s[-1] - self.s[0]
         if s.size and (s.min() < self.s[0] - 1e-9 * reach or s.max() > self.s[-1] + 1e-9 * reach):
@@ -69,8 +71,8 @@ class Centreline:
 def centreline(lengths, strains, spacing=1.0, base_pose=None):
     """The Centreline of pieces in a row.
 
-    lengths : (m,) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (m, 3). spacing : largest
-    distance of samples, mm. base_pose : (4, 4) frame of the base, default the identity.
+    lengths : (m,) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (m, 3). spacing :
+    largest distance of samples, mm. base_pose : (4, 4) frame of the base, default the identity.
     """
     lengths = np.asarray(lengths, float)
     if lengths.ndim != 1 or not lengths.size or not (lengths > 0).all():
@@ -85,7 +87,9 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
     piece = np.repeat(np.arange(m), counts)
     within = (np.arange(piece.size) - (last - counts)[piece]) * (lengths / counts)[piece]
     # of the whole pieces, then of the samples in them
-    coefficients = se3.screw_coefficients(np.concatenate([rate, rate[piece]]), np.concatenate([lengths, within]))
+    coefficients = se3.screw_coefficients(
+        np.concatenate([rate, rate[piece]]), np.concatenate([lengths, within])
+    )
     joints = _joints(coefficients[:m], basis, base_pose)
     s, poses = np.empty(piece.size + 1), np.empty((piece.size + 1, 4, 4))
     s[:-1], s[-1] = (ends - lengths)[piece] + within, ends[-1]
@@ -98,14 +102,17 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
 def free_shapes(lengths, strains, samples=20, base_pose=None):
     """(s (n, m samples + 1) in mm, poses (n, m samples + 1, 4, 4)) of n designs at once, of m pieces each.
 
-    lengths : (n, m) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (n, m, 3). samples : points of every
-    piece, joints included. base_pose : (4, 4) or (n, 4, 4), default the identity. What `centreline` does for one.
+    lengths : (n, m) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (n, m, 3). samples :
+    points of every piece, joints included. base_pose : (4, 4) or (n, 4, 4), default the identity. What
+    `centreline` does for one.
     """
     lengths = np.asarray(lengths, float)
     if lengths.ndim != 2 or not lengths.size or not (lengths > 0).all():
         raise InputError("lengths: give (designs, pieces) lengths larger than 0 mm")
     if strains.e.shape != (*lengths.shape, 3) or strains.k.shape != (*lengths.shape, 3):
-        raise InputError(f"strains: give e and k of shape {(*lengths.shape, 3)}, one row for every piece of every design")
+        raise InputError(
+            f"strains: give e and k of shape {(*lengths.shape, 3)}, one row for every piece of every design"
+        )
     if samples < 1:
         raise InputError(f"samples = {samples}: give at least 1 for every piece")
     n, m = lengths.shape
@@ -121,7 +128,8 @@ def free_shapes(lengths, strains, samples=20, base_pose=None):
 
 
 def _joints(coefficients, basis, base_pose):
-    """Poses of the joints (..., m + 1, 4, 4) of pieces in a row from their screws: coefficients (..., m, 4), basis (..., m, 4, 4, 4)."""
+    """Poses of the joints (..., m + 1, 4, 4) of pieces in a row from their screws: coefficients (..., m, 4),
+    basis (..., m, 4, 4, 4)."""
     lead, m = coefficients.shape[:-2], coefficients.shape[-2]
     steps = (coefficients[..., None, :] @ basis.reshape(*lead, m, 4, 16)).reshape(*lead, m, 4, 4)
     joints = np.empty((*lead, m + 1, 4, 4))

@@ -20,7 +20,8 @@ def shipped_law():
 
 
 def choose_law(name=TRAINED):
-    """The SegmentLaw called 'trained' or 'analytic', or the RodLaw in the file `name` (.npz); a law's own `name` gives it again."""
+    """The SegmentLaw called 'trained' or 'analytic', or the RodLaw in the file `name` (.npz); a law's own
+    `name` gives it again."""
     if name == TRAINED:
         return shipped_law()
     if name == ANALYTIC:

@@ -1,11 +1,11 @@
 """Will neighbouring chambers touch? A plate estimate of how far their walls bulge into the gap.
 
-A chamber's wall is taken as a rectangular plate, clamped on all edges, of the cavity's height and slanted length and of
-thickness `wall`, under the pressure P. Central deflection w from Roark's Formulas for Stress and Strain (7th ed.,
-Table 11.12, edges held), fitted by P a^4/(E t^4) = w/(alpha t) + MEMBRANE (w/t)^3 with a the shorter side, E = 3 mu and
-alpha(b/a) Timoshenko's small-deflection coefficient. Against the FE of twist-w12 and one-sided-w10 at 50 kPa it closes
-the gap 1.2 to 1.4 times too far: real edges turn, but gaps also open as the segment bends. It is a design rule; only the
-FE says whether walls touch.
+A chamber's wall is taken as a rectangular plate, clamped on all edges, of the cavity's height and slanted
+length and of thickness `wall`, under the pressure P. Central deflection w from Roark's Formulas for Stress
+and Strain (7th ed., Table 11.12, edges held), fitted by P a^4/(E t^4) = w/(alpha t) + MEMBRANE (w/t)^3 with a
+the shorter side, E = 3 mu and alpha(b/a) Timoshenko's small-deflection coefficient. Against the FE of
+twist-w12 and one-sided-w10 at 50 kPa it closes the gap 1.2 to 1.4 times too far: real edges turn, but gaps
+also open as the segment bends. It is a design rule; only the FE says whether walls touch.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Laws of the free strains compared on the held-out designs, and what more designs would bring.
 
-The analytic models with one fitted factor for each strain, the regressor over the pressure, alone and for what the analytic models leave,
-the regressor along the path of free states, and the one that learns from derivatives by the shape too, which is the law's: the analytic
-cell costs milliseconds a state.
+The analytic models with one fitted factor for each strain, the regressor over the pressure, alone and for
+what the analytic models leave, the regressor along the path of free states, and the one that learns from
+derivatives by the shape too, which is the law's: the analytic cell costs milliseconds a state.
 """
 
 import numpy as np
@@ -37,7 +37,8 @@ def analytic_strains(states):
 
 
 def compare_laws(training, held_out):
-    """[(law of the free strains, median error, 95th percentile, share without an answer)] on the coarsest mesh."""
+    """[(law of the free strains, median error, 95th percentile, share without an answer)] on the coarsest
+    mesh."""
     train, test = (sample.on(0).free.loaded for sample in (training, held_out))
     a_train, a_test = (analytic_strains(states) for states in (train, test))
     co = Coordinates(train.kind)
@@ -71,7 +72,8 @@ def _spread(error):
 
 
 def learning_curve(training, held_out):
-    """[(designs trained on, median error, 95th percentile)] of the free strains for the first parts of the training designs."""
+    """[(designs trained on, median error, 95th percentile)] of the free strains for the first parts of the
+    training designs."""
     states, test = (sample.on(0).free.loaded for sample in (training, held_out))
     numbers, rows = np.unique(states.design), []
     for part in CURVE:
@@ -83,8 +85,14 @@ def learning_curve(training, held_out):
 
 def law_table(rows):
     """Lines of a table of `compare_laws`."""
-    lines = ["", "| law of the free strains | median error | 95th percentile | without an answer |", "|---|---|---|---|"]
-    return lines + [f"| {name} | {median:.4f} | {high:.4f} | {without:.1%} |" for name, median, high, without in rows]
+    lines = [
+        "",
+        "| law of the free strains | median error | 95th percentile | without an answer |",
+        "|---|---|---|---|",
+    ]
+    return lines + [
+        f"| {name} | {median:.4f} | {high:.4f} | {without:.1%} |" for name, median, high, without in rows
+    ]
 
 
 def curve_table(rows):

@@ -1,7 +1,7 @@
 """Where a segment's cells end: its free pieces, bare core, cells, bare core.
 
-Every chamber counts with its whole pitch, half a gap at the ends included, and the ends of slanted one-sided segments turn about z
-(docs/theory-reduced.md).
+Every chamber counts with its whole pitch, half a gap at the ends included, and the ends of slanted one-sided
+segments turn about z (docs/theory-reduced.md).
 """
 
 import numpy as np
@@ -11,17 +11,19 @@ from geometry.parameters import ONE_SIDED
 
 
 def end_turn(segment, free):
-    """Turn (rad) about z of the section frame from the bare base end to the active part with free strains (6,); at the tip end back.
+    """Turn (rad) about z of the section frame from the bare base end to the active part with free strains
+    (6,); at the tip end back.
 
-    A line at height z of the section runs at the slope e2 - k1 z to the frame's x axis. The bottom of a one-sided core carries no
-    chambers, and slanted ones do not shear it: the line along it goes on straight from the bare end. (Measured, not derived.)
+    A line at height z of the section runs at the slope e2 - k1 z to the frame's x axis. The bottom of a
+    one-sided core carries no chambers, and slanted ones do not shear it: the line along it goes on straight
+    from the bare end. (Measured, not derived.)
     """
     return float(free[3] * segment.core_bottom - free[1]) if segment.kind == ONE_SIDED else 0.0
 
 
 def free_manipulator(segments, strains, counts):
-    """(lengths (3 n,) in mm, RodStrains (3 n, 3)) of n segments in a row: the pieces of each, at its cells' free RodStrains (n, 3);
-    counts: of chambers, real numbers."""
+    """(lengths (3 n,) in mm, RodStrains (3 n, 3)) of n segments in a row: the pieces of each, at its cells'
+    free RodStrains (n, 3); counts: of chambers, real numbers."""
     n, bare = len(segments), [s.end_wall for s in segments]
     lengths, e, k = np.empty((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 3, 3))
     lengths[:, 0] = lengths[:, 2] = bare

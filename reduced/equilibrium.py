@@ -1,8 +1,8 @@
 """Equilibria of a pressurised body with few unknowns: minima of U(x) - P V(x), followed from P = 0.
 
-Both analytic laws are such a potential; U is the elastic energy and V the volume of the closed cavity, so the load is
-a true follower pressure with its thrust on the ends. A minimum is a stable equilibrium under prescribed pressure; where
-the branch of minima from P = 0 ends there is a limit load.
+Both analytic laws are such a potential; U is the elastic energy and V the volume of the closed cavity, so the
+load is a true follower pressure with its thrust on the ends. A minimum is a stable equilibrium under
+prescribed pressure; where the branch of minima from P = 0 ends there is a limit load.
 """
 
 import numpy as np
@@ -38,11 +38,13 @@ def _minimise(potential, x, pressure, iterations=30):
 
 
 def states(potential, pressures):
-    """Yield the state (unknowns,) at each of the increasing `pressures` (n,) >= 0 in MPa, reached from the one before.
+    """Yield the state (unknowns,) at each of the increasing `pressures` (n,) >= 0 in MPa, reached from the
+    one before.
 
-    `potential` has `start` (the unloaded state), `scale` (size of the energy), `admissible(x)`, and `energy(x)` and
-    `volume(x)`, each returning value, gradient and Hessian in unknowns of order 1. A step in pressure that finds no
-    minimum close by is halved; ConvergenceError names the pressure reached when the branch of minima ends.
+    `potential` has `start` (the unloaded state), `scale` (size of the energy), `admissible(x)`, and
+    `energy(x)` and `volume(x)`, each returning value, gradient and Hessian in unknowns of order 1. A step in
+    pressure that finds no minimum close by is halved; ConvergenceError names the pressure reached when the
+    branch of minima ends.
     """
     x, reached, step = potential.start, 0.0, np.inf
     for pressure in pressures:

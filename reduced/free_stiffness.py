@@ -1,8 +1,9 @@
 """The tangent stiffness of the free states of one kind of cell, as a trained law knows it.
 
-Where walls meet it jumps, that of bending most, and from there on depends on how far they would overlap. So what it is without contact,
-and what contact adds, are learned apart, each from the states that tell. (Measured, against one process that is told whether walls
-touch: a sixth to a quarter off the 95th percentile of the error.)
+Where walls meet it jumps, that of bending most, and from there on depends on how far they would overlap. So
+what it is without contact, and what contact adds, are learned apart, each from the states that tell.
+(Measured, against one process that is told whether walls touch: a sixth to a quarter off the 95th percentile
+of the error.)
 """
 
 from dataclasses import dataclass
@@ -16,8 +17,8 @@ from reduced.side_by_side import SideBySide
 
 @dataclass(frozen=True)
 class FreeStiffness:
-    """smooth: process of Coordinates.learned_stiffness without contact; contact: of what that adds, in `order`, or None where too few
-    designs were seen to touch and smooth has learned from all of them."""
+    """smooth: process of Coordinates.learned_stiffness without contact; contact: of what that adds, in
+    `order`, or None where too few designs were seen to touch and smooth has learned from all of them."""
 
     kind: str
     smooth: SideBySide
@@ -28,7 +29,8 @@ class FreeStiffness:
         return Coordinates(self.kind)
 
     def at(self, shape, strains, closed, level):
-        """(n, 6, 6) of free states with these strains (n, 6) whose walls have closed so much of their gap (n,), on the mesh of a level."""
+        """(n, 6, 6) of free states with these strains (n, 6) whose walls have closed so much of their gap
+        (n,), on the mesh of a level."""
         co = self.coordinates
         learned = self.smooth(co.stiffness_inputs(shape, strains, level))
         touch = co.touch(closed)
@@ -40,5 +42,9 @@ class FreeStiffness:
 
 
 def order(coordinates):
-    """The learned stiffnesses in the order in which contact's part is learned: that of bending, with a metric of its own, and the rest."""
-    return [coordinates.bending, *np.delete(np.arange(len(coordinates.stiffness_parity)), coordinates.bending)]
+    """The learned stiffnesses in the order in which contact's part is learned: that of bending, with a metric
+    of its own, and the rest."""
+    return [
+        coordinates.bending,
+        *np.delete(np.arange(len(coordinates.stiffness_parity)), coordinates.bending),
+    ]

@@ -1,11 +1,12 @@
 """Gaussian processes: smooth functions of several inputs from few points, with their uncertainty.
 
-Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x') M|^2 / 2) + TREND (1 + x.x'), a smooth function and
-a plane whose coefficients are hardly restricted, the metric M a scale for each input and directions that mix them; noise on
-the observations, and noise that those of a group (the states of one mesh) have in common. Slopes are observed too: directional
-derivatives, with a noise of their own. Metric and noises are shared by the outputs and maximise the likelihood, with each output's
-variance profiled out (Rasmussen & Williams 2006, ch. 2, 5 and 9.4). Many observations are summed up on `inducing` points
-(deterministic training conditional, ch. 8.3), exactly when all observations are among them and there are no slopes.
+Prior of each output, in units of its own variance: k(x, x') = exp(-|(x - x') M|^2 / 2) + TREND (1 + x.x'), a
+smooth function and a plane whose coefficients are hardly restricted, the metric M a scale for each input and
+directions that mix them; noise on the observations, and noise that those of a group (the states of one mesh)
+have in common. Slopes are observed too: directional derivatives, with a noise of their own. Metric and noises
+are shared by the outputs and maximise the likelihood, with each output's variance profiled out (Rasmussen &
+Williams 2006, ch. 2, 5 and 9.4). Many observations are summed up on `inducing` points (deterministic training
+conditional, ch. 8.3), exactly when all observations are among them and there are no slopes.
 """
 
 from dataclasses import dataclass
@@ -17,21 +18,26 @@ from scipy.optimize import minimize
 
 #: prior variance of the plane's coefficients over that of the smooth function
 TREND = 100.0
-#: noises of observations, groups and slopes over the prior variance. What a mesh adds, measured by remeshing, is about a percent of
-#: how designs differ: without that bound the likelihood may take for noise what designs do near their limit loads
+#: noises of observations, groups and slopes over the prior variance. What a mesh adds, measured by remeshing,
+#: is about a percent of how designs differ: without that bound the likelihood may take for noise what designs
+#: do near their limit loads
 LOG_NOISES = tuple((np.log(1e-6), np.log(most)) for most in (1e-4, 1e-5, 1.0))
 LOG_SCALE = (np.log(0.3), np.log(100.0))
 JITTER = 1e-9
 #: of an output, which may be constant
 LEAST_VARIANCE = 1e-20
-#: evaluated at once: what fits into a core's cache; summed up at once: what fits into a small machine's memory
+#: evaluated at once: what fits into a core's cache; summed up at once: what fits into a small machine's
+#: memory
 ROWS, MANY_ROWS = 256, 4096
-#: where the likelihood starts from: scales; noise of observations, of groups, of slopes. It has several maxima: the best one counts
+#: where the likelihood starts from: scales; noise of observations, of groups, of slopes. It has several
+#: maxima: the best one counts
 STARTS = ((3.0, 1e-5, 1e-5, 1e-3), (6.0, 1e-4, 1e-6, 1e-2))
-#: inducing points lie at observations and this far from them, in standard deviations of the inputs, along the ways of their slopes
+#: inducing points lie at observations and this far from them, in standard deviations of the inputs, along the
+#: ways of their slopes
 AWAY = 0.5
-#: further directions of the metric beside the inputs themselves, where slopes tell them. (Measured: up to a fifth off the error with
-#: slopes; from values alone they fit the chance of the sample, and the error of designs not seen grows by up to a quarter.)
+#: further directions of the metric beside the inputs themselves, where slopes tell them. (Measured: up to a
+#: fifth off the error with slopes; from values alone they fit the chance of the sample, and the error of
+#: designs not seen grows by up to a quarter.)
 EXTRA = 2
 #: steps towards the largest likelihood, from a start and from what another process has found
 MOST_STEPS, MORE_STEPS = 100, 30
@@ -41,7 +47,8 @@ NEAR = 1e-2
 
 @dataclass(frozen=True)
 class Slopes:
-    """Derivatives of p outputs along `ways` (r, d), changes of the inputs, at the observations `at` (r,): values (r, p)."""
+    """Derivatives of p outputs along `ways` (r, d), changes of the inputs, at the observations `at` (r,):
+    values (r, p)."""
 
     at: np.ndarray
     ways: np.ndarray
@@ -68,10 +75,11 @@ def no_slopes(inputs, outputs):
 class GaussianProcess:
     """Means of p outputs at inputs of d numbers, which are shifted by `shift` and divided by `width` first.
 
-    inducing (m, d), observed (n, d): inducing points and inputs of the observations in those units; group (n,), trust (n,): of `fit`,
-    of the first output; at (r,), ways (r, d): of the Slopes, in those units and of length 1. metric (d, e): the kernel's distances are
-    those of inputs times it; weights (m + 1 + d, p): of the kernels at the inducing points, the constant and the slopes; variance (p,):
-    each output's prior variance; noises: over that.
+    inducing (m, d), observed (n, d): inducing points and inputs of the observations in those units; group
+    (n,), trust (n,): of `fit`, of the first output; at (r,), ways (r, d): of the Slopes, in those units and
+    of length 1. metric (d, e): the kernel's distances are those of inputs times it; weights (m + 1 + d, p):
+    of the kernels at the inducing points, the constant and the slopes; variance (p,): each output's prior
+    variance; noises: over that.
     """
 
     shift: np.ndarray
@@ -111,9 +119,13 @@ class GaussianProcess:
 
     @cached_property
     def _affine(self):
-        """What `linear` gives at `shift` (d + 2 + p,), how it grows from there (d, d + 2 + p), and what its squares are times (d,)."""
+        """What `linear` gives at `shift` (d + 2 + p,), how it grows from there (d, d + 2 + p), and what its
+        squares are times (d,)."""
         d, constant = len(self.to_kernel), self.weights[len(self.points)]
-        at_shift, slopes = np.concatenate([np.zeros(d), [1.0, 0.0], constant]), [self.to_kernel, np.zeros((d, 2)), self.plane]
+        at_shift, slopes = (
+            np.concatenate([np.zeros(d), [1.0, 0.0], constant]),
+            [self.to_kernel, np.zeros((d, 2)), self.plane],
+        )
         return at_shift, np.hstack(slopes), np.full(d, -0.5)
 
     @cached_property
@@ -122,10 +134,13 @@ class GaussianProcess:
 
     @cached_property
     def _weighed_points(self):
-        return (self.weights[: len(self.points), :, None] * self.points[:, None, :]).reshape(len(self.points), -1)
+        return (self.weights[: len(self.points), :, None] * self.points[:, None, :]).reshape(
+            len(self.points), -1
+        )
 
     def linear(self, x):
-        """(n, d + 2 + p) of inputs x (n, d), side by side: those where distances are the kernel's, a (n, d); 1; -|a|^2/2; the plane."""
+        """(n, d + 2 + p) of inputs x (n, d), side by side: those where distances are the kernel's, a (n, d);
+        1; -|a|^2/2; the plane."""
         at_shift, slopes, halves = self._affine
         # dot: for a few rows it takes a third of the time of @
         out, d = (x - self.shift).dot(slopes), len(slopes)
@@ -143,15 +158,19 @@ class GaussianProcess:
         return _kernel_root(self.points)
 
     def _in_prior(self, rows):
-        """(m + 1 + d, n) of rows (n, m + 1 + d) as `_value_rows` gives them, by weights in units of their prior's deviation."""
+        """(m + 1 + d, n) of rows (n, m + 1 + d) as `_value_rows` gives them, by weights in units of their
+        prior's deviation."""
         m = len(self.points)
-        return np.vstack([solve_triangular(self._kernel_root, rows[:, :m].T, lower=True), np.sqrt(TREND) * rows[:, m:].T])
+        return np.vstack(
+            [solve_triangular(self._kernel_root, rows[:, :m].T, lower=True), np.sqrt(TREND) * rows[:, m:].T]
+        )
 
     @cached_property
     def _root(self):
-        """(m + 1 + d, same) lower factor of what observations, slopes and prior say of the weights `_in_prior`, times the noise, as if
-        every output were as noisy as the first: found when asked for, since it is ten times the size of all the rest. In these units sums
-        of squares are exact enough (measured: to 1e-8, in an eighth of the memory that a QR of all rows takes)."""
+        """(m + 1 + d, same) lower factor of what observations, slopes and prior say of the weights
+        `_in_prior`, times the noise, as if every output were as noisy as the first: found when asked for,
+        since it is ten times the size of all the rest. In these units sums of squares are exact enough
+        (measured: to 1e-8, in an eighth of the memory that a QR of all rows takes)."""
         spots, metric, trust = self.inducing, self._square_metric, self.trust.astype(float)
         values = self._in_prior(_value_rows(self.observed, spots, metric)).T
         values = _whitener(self.group, self.common_noise / self.noise)(trust[:, None] * values)
@@ -190,14 +209,20 @@ class GaussianProcess:
         return _kernel(a, a) - explained.T @ explained + self.noise * known.T @ known
 
     def _unknown(self, x):
-        """Inputs where distances are the kernel's, and roots (., n): of the prior that inducing points explain, of what is left there."""
+        """Inputs where distances are the kernel's, and roots (., n): of the prior that inducing points
+        explain, of what is left there."""
         z = (x - self.shift) / self.width
         rows = self._in_prior(_value_rows(z, self.inducing, self._square_metric))
-        return z @ self._square_metric, rows[: len(self.points)], solve_triangular(self._root, rows, lower=True)
+        return (
+            z @ self._square_metric,
+            rows[: len(self.points)],
+            solve_triangular(self._root, rows, lower=True),
+        )
 
 
 def _columns(b):
-    """(e + 2, m) of points b (m, e): their product with a, 1, -|a|^2/2 side by side (n, e + 2) is -|a - b|^2/2."""
+    """(e + 2, m) of points b (m, e): their product with a, 1, -|a|^2/2 side by side (n, e + 2) is -|a -
+    b|^2/2."""
     # contiguous by rows: a product of two rows with it takes a third of the time that it takes by columns
     return np.ascontiguousarray(np.vstack([b.T, (b * b).sum(axis=1) / -2, np.ones(len(b))]))
 
@@ -225,14 +250,25 @@ def _slope_rows(z, ways, spots, metric):
     return np.hstack([along, np.zeros((len(z), 1)), ways])
 
 
-def fit(x, y, group, trust=None, slopes=None, most=400, inducing=1500, seed=0, like=None, again=False, noises=LOG_NOISES):
+def fit(
+    x,
+    y,
+    group,
+    trust=None,
+    slopes=None,
+    most=400,
+    inducing=1500,
+    seed=0,
+    like=None,
+    again=False,
+    noises=LOG_NOISES,
+):
     """The GaussianProcess through y (n, p) at x (n, d) and Slopes there.
 
     like: another one whose metric and noise are taken, or with `again` looked for once more, from there.
-    group (n,): equal where noise is common. trust (n, p), the same within a group: what noises are divided by, for outputs that
-    are quotients by something small.
-    Metric and noise are found on at most `most` of the observations, spread over the groups, and as many slopes; noises: bounds like
-    LOG_NOISES.
+    group (n,): equal where noise is common. trust (n, p), the same within a group: what noises are divided
+    by, for outputs that are quotients by something small. Metric and noise are found on at most `most` of the
+    observations, spread over the groups, and as many slopes; noises: bounds like LOG_NOISES.
     """
     trust, slopes = np.ones(y.shape) if trust is None else trust, slopes or no_slopes(x.shape[1], y.shape[1])
     random = np.random.default_rng(seed)
@@ -246,29 +282,39 @@ def fit(x, y, group, trust=None, slopes=None, most=400, inducing=1500, seed=0, l
         some, steepest = _spread_over(group, random)[:most], random.permutation(len(steep.at))[:most]
         extra = EXTRA if len(steep.at) else 0
         starts = [_logarithms(metric, found)] if like else [_start(z.shape[1], extra, *s) for s in STARTS]
-        metric, found = _most_likely(z, y, group, trust, some, steep.of(steepest), starts, MORE_STEPS if like else MOST_STEPS, noises)
+        metric, found = _most_likely(
+            z, y, group, trust, some, steep.of(steepest), starts, MORE_STEPS if like else MOST_STEPS, noises
+        )
     return _condition(z, y, group, trust, spots, steep, shift, width, metric, found)
 
 
 def _most_likely(z, y, group, trust, some, slopes, starts, steps, noises):
     """(metric, (noise, common noise, noise of slopes)) by the observations `some` and all slopes."""
     d = z.shape[1]
-    points = np.vstack([z[some], z[slopes.at] - NEAR / 2 * slopes.ways, z[slopes.at] + NEAR / 2 * slopes.ways])
+    points = np.vstack(
+        [z[some], z[slopes.at] - NEAR / 2 * slopes.ways, z[slopes.at] + NEAR / 2 * slopes.ways]
+    )
     data = []
     for columns in _alike(trust):
         t, v = trust[some, columns[0]], y[np.ix_(some, columns)]
         centred = v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum()
-        data.append((np.vstack([centred, slopes.values[:, columns]]), 1 / np.append(t, trust[slopes.at, columns[0]])))
+        data.append(
+            (np.vstack([centred, slopes.values[:, columns]]), 1 / np.append(t, trust[slopes.at, columns[0]]))
+        )
     same = group[some][:, None] == group[some]
     bounds = [LOG_SCALE] * d + [(None, None)] * (len(starts[0]) - d - 3) + list(noises)
     settings = {"jac": True, "method": "L-BFGS-B", "bounds": bounds, "options": {"maxiter": steps}}
-    best = min((minimize(_misfit, start, (points, data, same), **settings) for start in starts), key=lambda result: result.fun).x
+    best = min(
+        (minimize(_misfit, start, (points, data, same), **settings) for start in starts),
+        key=lambda result: result.fun,
+    ).x
     return _metric(best, d), tuple(np.exp(best[-3:]).tolist())
 
 
 def _spread_over(groups, random):
-    """(n,) the rows in random order, one of each group first, then another of each, and so on: states of one path are alike, and would
-    tell the likelihood how smooth the path is and little on how paths differ. (Measured: up to a third off the error.)"""
+    """(n,) the rows in random order, one of each group first, then another of each, and so on: states of one
+    path are alike, and would tell the likelihood how smooth the path is and little on how paths differ.
+    (Measured: up to a third off the error.)"""
     order = random.permutation(len(groups))
     _, index, count = np.unique(groups[order], return_inverse=True, return_counts=True)
     turn = np.empty(len(order), int)
@@ -282,7 +328,8 @@ def _start(d, extra, scale, *noises):
 
 
 def _logarithms(metric, noises):
-    """What the likelihood is a function of: logarithms of scales and noises, and the directions between them as they are."""
+    """What the likelihood is a function of: logarithms of scales and noises, and the directions between them
+    as they are."""
     d = len(metric)
     return np.concatenate([-np.log(np.diag(metric)), metric[:, d:].T.ravel(), np.log(noises)])
 
@@ -301,7 +348,8 @@ def _alike(trust):
 
 
 class _System:
-    """Least-squares rows of observations at z (n, d), of slopes there, and of the prior, by weights of kernels at spots (m, d)."""
+    """Least-squares rows of observations at z (n, d), of slopes there, and of the prior, by weights of
+    kernels at spots (m, d)."""
 
     def __init__(self, z, group, at, ways, spots, metric, noises):
         noise, common_noise, slope_noise = noises
@@ -331,12 +379,16 @@ def _condition(z, y, group, trust, spots, slopes, shift, width, metric, noises):
         right = np.zeros((len(z) + len(at) + size, k))
         right[:-size] = system.weighed(y[:, columns] - shifted, slopes.values[:, columns], t)
         # of [A b] = Q R the last columns hold Q^T b and, below, what no weights can fit
-        r = qr(np.hstack([system.rows(t), right]), mode="r", overwrite_a=True, check_finite=False)[0][: size + k]
+        r = qr(np.hstack([system.rows(t), right]), mode="r", overwrite_a=True, check_finite=False)[0][
+            : size + k
+        ]
         w = solve_triangular(r[:size, :size], r[:size, size:])
         variance[columns] = (r[size:, size:] ** 2).sum(axis=0) / noises[0] / (len(z) + len(at))
         w[m] += shifted
         weights[:, columns] = w
-    return GaussianProcess(shift, width, spots, z, group, trust[:, 0], at, slopes.ways, metric, weights, variance, *noises)
+    return GaussianProcess(
+        shift, width, spots, z, group, trust[:, 0], at, slopes.ways, metric, weights, variance, *noises
+    )
 
 
 def _whitener(group, ratio):

@@ -34,7 +34,8 @@ def _gauss(low, high, n=GAUSS_POINTS):
 class HelicalCell:
     """Potential energy of one cell of a one-sided Segment; `strains` follows its minimum from P = 0.
 
-    Every argument of a law (reduced/laws.py) is linear in the unknowns, `rows @ x`: gradient and Hessian are exact.
+    Every argument of a law (reduced/laws.py) is linear in the unknowns, `rows @ x`: gradient and Hessian are
+    exact.
     """
 
     name = "one-sided cell"
@@ -53,7 +54,8 @@ class HelicalCell:
         self.mu = s.material.mu
         self.length = s.width / s.sin  # of the chamber, along eta
         self.scale = self.mu * s.width * s.pitch * self.cell.core_height
-        y, self.along_weights = _gauss(0.0, 1.0, ALONG_POINTS)  # half of the chamber; the other half is its image
+        # half of the chamber; the other half is its image
+        y, self.along_weights = _gauss(0.0, 1.0, ALONG_POINTS)
         self.along = along_shapes(y)  # (derivative, shape, points)
         self.walls = (
             (membrane, *self._core()),
@@ -71,12 +73,18 @@ class HelicalCell:
         rows, weights = [], []
         for fraction, part, top in ((share, 1 - share, s.cavity_floor), (1 - share, -share, s.core_top)):
             layers = [
-                *([(s.core_bottom, s.layer_top, s.width * s.layer_material.mu / self.mu)] if s.layer_thickness else []),
+                *(
+                    [(s.core_bottom, s.layer_top, s.width * s.layer_material.mu / self.mu)]
+                    if s.layer_thickness
+                    else []
+                ),
                 (s.layer_top, -half, s.width),
                 (-half, min(half, top), s.width - s.channel_width),
                 (half, top, s.width),
             ]
-            z, w = np.concatenate([np.multiply([[1.0], [b]], _gauss(low, high)) for low, high, b in layers], axis=1)
+            z, w = np.concatenate(
+                [np.multiply([[1.0], [b]], _gauss(low, high)) for low, high, b in layers], axis=1
+            )
             rows.append(self.cell.gradient(z, self.along[0], part).reshape(-1, 4, SIZE))
             weights.append(np.outer(w * fraction * s.pitch, self.along_weights).ravel())
         return np.concatenate(rows), np.concatenate(weights)
@@ -106,20 +114,34 @@ class HelicalCell:
         return np.concatenate(rows), np.concatenate(weights)
 
     def _long_walls(self):
-        """Stretching of the two long walls, bulging included: (stretch along, height, slope along, slope upwards)."""
+        """Stretching of the two long walls, bulging included: (stretch along, height, slope along, slope
+        upwards)."""
         s, H = self.segment, self.cell.wall_height
         x, wx = _gauss(0.0, 1.0)
         shape, slope, _ = wall_shapes(x)
         z = self.cell.foot + H * x
         half = self.length / 2
-        slope_up = s.cavity_thickness / 2 / H * np.tensordot(slope, self.cell.wall_amplitudes(self.along[0]), axes=(0, 0))
-        slope_along = s.cavity_thickness / 2 / half * np.tensordot(shape, self.cell.wall_amplitudes(self.along[1]), axes=(0, 0))
-        arguments = np.broadcast_arrays(self.cell.along_eta(z)[:, None], self.cell.section("height"), slope_along, slope_up)
+        slope_up = (
+            s.cavity_thickness
+            / 2
+            / H
+            * np.tensordot(slope, self.cell.wall_amplitudes(self.along[0]), axes=(0, 0))
+        )
+        slope_along = (
+            s.cavity_thickness
+            / 2
+            / half
+            * np.tensordot(shape, self.cell.wall_amplitudes(self.along[1]), axes=(0, 0))
+        )
+        arguments = np.broadcast_arrays(
+            self.cell.along_eta(z)[:, None], self.cell.section("height"), slope_along, slope_up
+        )
         weights = np.outer(wx * H * 2 * s.wall * self.length, self.along_weights)
         return np.stack(arguments, axis=2).reshape(-1, 4, SIZE), weights.ravel()
 
     def _gas(self):
-        """The cavity's volume = sum of weights times (opening, stretch along, height) less (sliding, shear, height)."""
+        """The cavity's volume = sum of weights times (opening, stretch along, height) less (sliding, shear,
+        height)."""
         s, rows, weights = self.segment, [], []
         for low, high in ((s.cavity_floor, self.cell.foot), (self.cell.foot, s.cavity_top)):
             z, w = _gauss(low, high)
@@ -154,13 +176,24 @@ class HelicalCell:
         # two walls; plate energy/(mu/2) = wall^3/3 (kx^2 + ky^2 + kx ky + kxy^2): E = 3 mu, nu = 1/2
         wall = s.wall**3 / 3
         cross = integral(kx, ky)
-        hessian = 2 * wall * (2 * integral(kx, kx) + 2 * integral(ky, ky) + cross + cross.T + 2 * integral(kxy, kxy))
+        hessian = (
+            2
+            * wall
+            * (2 * integral(kx, kx) + 2 * integral(ky, ky) + cross + cross.T + 2 * integral(kxy, kxy))
+        )
         # top wall of span t + wall, bent by the rotation of its two corners
         span = t + s.wall
         turn = t / 2 / H * self.cell.chamber("corner", self.along[0])
-        hessian += 8 * s.top_wall**3 / 3 / span * 2 * half * np.einsum("i,is,it->st", self.along_weights, turn, turn)
+        hessian += (
+            8 * s.top_wall**3 / 3 / span * 2 * half * np.einsum("i,is,it->st", self.along_weights, turn, turn)
+        )
         # side walls, bent by the rotation of the long walls' ends
-        turn = t / 2 / half * np.tensordot(profile[0], self.cell.wall_amplitudes(self.cell.end[1]), axes=(0, 0))[:, 0]
+        turn = (
+            t
+            / 2
+            / half
+            * np.tensordot(profile[0], self.cell.wall_amplitudes(self.cell.end[1]), axes=(0, 0))[:, 0]
+        )
         hessian += 8 * s.side_wall**3 / 3 / span * 2 * H * np.einsum("i,is,it->st", wx, turn, turn)
         # sliding shears the top wall, and the long walls where they do not follow the core
         tops = np.array([self.cell.foot + H])
@@ -168,12 +201,13 @@ class HelicalCell:
         hessian += 2 * t * s.top_wall * self.length * np.outer(shear, shear)
         shear = t / 2 / H * (self.cell.section("slide") - self.cell.plane_sliding(tops)[0])
         hessian += 2 * 2 * s.wall * H * self.length * np.outer(shear, shear)
-        # where the opening varies along the chamber the core is sheared: its displacement is a sawtooth across xi
+        # where the opening varies along the chamber the core is sheared: its displacement is a sawtooth
+        # across xi
         mean_square = (t * (1 - self.cell.share)) ** 2 / 12
         z, w = _gauss(s.core_bottom, s.core_top)
-        slope = self.cell.chamber("alpha", self.along[1]) + z[:, None, None] / self.cell.core_height * self.cell.chamber(
-            "beta", self.along[1]
-        )
+        slope = self.cell.chamber("alpha", self.along[1]) + z[
+            :, None, None
+        ] / self.cell.core_height * self.cell.chamber("beta", self.along[1])
         slope /= self.length / 2
         weight = np.outer(w * s.width * s.pitch * mean_square, self.along_weights)
         return hessian + 2 * np.einsum("ij,ijs,ijt->st", weight, slope, slope)
@@ -203,7 +237,10 @@ class HelicalCell:
         """e and k, each (n, 3), of unknowns (n, SIZE)."""
         e, k = np.zeros((2, len(x), 3))
         e[:, 0], e[:, 1] = x[:, INDEX["M11"]], x[:, INDEX["M12"]]
-        k[:, 0], k[:, 1] = -x[:, INDEX["K12"]] / self.cell.core_height, x[:, INDEX["K11"]] / self.cell.core_height
+        k[:, 0], k[:, 1] = (
+            -x[:, INDEX["K12"]] / self.cell.core_height,
+            x[:, INDEX["K11"]] / self.cell.core_height,
+        )
         return e, k
 
 

@@ -1,7 +1,7 @@
 """How far a trained law is from finite elements of designs that it has not seen.
 
-Judged are states on the coarsest mesh, which most designs have, with the law for that mesh. All figures are over the states of all
-designs together.
+Judged are states on the coarsest mesh, which most designs have, with the law for that mesh. All figures are
+over the states of all designs together.
 """
 
 from dataclasses import replace
@@ -25,7 +25,9 @@ def strain_error(states, strains):
 def tip_error(states, strains):
     """(n,) distance of the tips of free segments of TIP_LENGTH, at normal pitch PITCH, over that length."""
     scale = np.array([PITCH, PITCH, PITCH, 1, 1, 1]) ** -1.0
-    tips = [exp_pose(TIP_LENGTH * q[:, [3, 4, 5, 0, 1, 2]] * scale)[:, :3, 3] for q in (states.strains, strains)]
+    tips = [
+        exp_pose(TIP_LENGTH * q[:, [3, 4, 5, 0, 1, 2]] * scale)[:, :3, 3] for q in (states.strains, strains)
+    ]
     return np.linalg.norm(tips[1] - tips[0], axis=1) / TIP_LENGTH
 
 
@@ -36,7 +38,8 @@ def stiffness_error(states, K):
 
 
 def force_error(law, sample):
-    """(m,) norm of the force error over that of the force, whitened by the stiffness; law alone, its free states included."""
+    """(m,) norm of the force error over that of the force, whitened by the stiffness; law alone, its free
+    states included."""
     f = sample.around
     free = law.free_strains(f.shape, f.pressure)
     closed = law.closed(f.shape, f.pressure, free)
@@ -46,7 +49,10 @@ def force_error(law, sample):
     by_v = D1[:, None] * (v + anharmonic_gradient(v, law.anharmonic_at(f.shape, free, closed)))
     forces = np.einsum("nij,ni->nj", M, by_v)
     own, _ = whitening(law.kind, symmetric(f.matrices))
-    white = [np.linalg.solve(np.swapaxes(own, 1, 2), x[..., None])[..., 0] for x in (forces - sample.forces, sample.forces)]
+    white = [
+        np.linalg.solve(np.swapaxes(own, 1, 2), x[..., None])[..., 0]
+        for x in (forces - sample.forces, sample.forces)
+    ]
     return np.linalg.norm(white[0], axis=1) / np.linalg.norm(white[1], axis=1)
 
 
@@ -70,7 +76,9 @@ def misses(law, sample):
     return {
         "strain": strain_error(loaded, q),
         "tip": tip_error(loaded, q),
-        "stiffness": stiffness_error(sample.free, law.free_stiffness(sample.free.shape, sample.free.pressure)),
+        "stiffness": stiffness_error(
+            sample.free, law.free_stiffness(sample.free.shape, sample.free.pressure)
+        ),
         "force": force[sample.doubled],
         "force in other directions": force[~sample.doubled],
         "inside": within(law, loaded),
@@ -96,7 +104,8 @@ def figures(found):
 
 
 def finest_mesh(law, held_out):
-    """{figure: number} of the free strains on the finest of several meshes with the law as it is, which is for that mesh."""
+    """{figure: number} of the free strains on the finest of several meshes with the law as it is, which is
+    for that mesh."""
     fine = held_out.free.of(held_out.free.level == law.level).loaded
     if not law.level or not len(fine.size):
         return {}
@@ -109,7 +118,8 @@ def finest_mesh(law, held_out):
 
 
 def further_angles(found):
-    """{figure: number} of the free states of designs more slanted than the held-out ones; found: [(their numbers, `misses`)]."""
+    """{figure: number} of the free states of designs more slanted than the held-out ones; found: [(their
+    numbers, `misses`)]."""
     if not found:
         return {}
     of_all = figures([missed for _, missed in found])

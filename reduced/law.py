@@ -1,8 +1,9 @@
-"""The trained law of a rod's sections: free strains, stiffness and enthalpy of cells, learned from finite elements.
+"""The trained law of a rod's sections: free strains, stiffness and enthalpy of cells, learned from finite
+elements.
 
-`RodLaw` knows both kinds of segment; `RodLaw.of(segment)` is the law of one of them in mm and MPa, with what a rod asks:
-free_strains(P), psi(q, P), force(q, P), stiffness(q, P). Everything else is without dimension (base.dataset). Trained by
-`pneunet train` (reduced.training); numpy and scipy alone.
+`RodLaw` knows both kinds of segment; `RodLaw.of(segment)` is the law of one of them in mm and MPa, with what
+a rod asks: free_strains(P), psi(q, P), force(q, P), stiffness(q, P). Everything else is without dimension
+(base.dataset). Trained by `pneunet train` (reduced.training); numpy and scipy alone.
 """
 
 from dataclasses import dataclass, fields
@@ -38,10 +39,10 @@ LOWEST = 1e-9
 
 @dataclass(frozen=True)
 class KindLaw:
-    """The law of one kind. path, stiffness: of the free states; anharmonic: of the enthalpy around them; quantile (6,): what a standard
-    deviation of each strain is multiplied by for a 90 % interval; low, high (r,): range of Coordinates.ranged; doubt: largest deviation of
-    the free states' pressure that counts as known; level: the mesh that is predicted, by its place among those trained on, the
-    finest last."""
+    """The law of one kind. path, stiffness: of the free states; anharmonic: of the enthalpy around them;
+    quantile (6,): what a standard deviation of each strain is multiplied by for a 90 % interval; low, high
+    (r,): range of Coordinates.ranged; doubt: largest deviation of the free states' pressure that counts as
+    known; level: the mesh that is predicted, by its place among those trained on, the finest last."""
 
     kind: str
     path: FreePath
@@ -61,11 +62,13 @@ class KindLaw:
         return self.coordinates.ranged(shape, pressure, self.level)
 
     def free_strains(self, shape, pressure):
-        """(n, 6) free strains of shape numbers (n, 13) at P/mu (n,); beyond the end of their path, as at a limit load, those there."""
+        """(n, 6) free strains of shape numbers (n, 13) at P/mu (n,); beyond the end of their path, as at a
+        limit load, those there."""
         return self.path.strains(shape, np.maximum(pressure, LOWEST), self.level)
 
     def free_strains_and_slopes(self, shape, pressure):
-        """(strains (n, 6), slopes (n, 6, 14)): derivatives by the 13 shape numbers (the angle in degrees) and P/mu."""
+        """(strains (n, 6), slopes (n, 6, 14)): derivatives by the 13 shape numbers (the angle in degrees) and
+        P/mu."""
         return self.path.strains_and_slopes(shape, np.maximum(pressure, LOWEST), self.level)
 
     def free_stiffness(self, shape, pressure):
@@ -74,16 +77,18 @@ class KindLaw:
         return self.stiffness_at(shape, strains, self.closed(shape, pressure, strains))
 
     def stiffness_at(self, shape, strains, closed):
-        """(n, 6, 6) the same, of free states with these strains (n, 6) whose walls have closed so much of their gap (n,)."""
+        """(n, 6, 6) the same, of free states with these strains (n, 6) whose walls have closed so much of
+        their gap (n,)."""
         return self.stiffness.at(shape, strains, closed, self.level)
 
     def closed(self, shape, pressure, strains):
-        """(n,) part of the gap that walls have closed in free states with these strains (n, 6), as if they could go on: from 1 on they
-        touch."""
+        """(n,) part of the gap that walls have closed in free states with these strains (n, 6), as if they
+        could go on: from 1 on they touch."""
         return self.path.closing.closed(shape, pressure, strains)
 
     def anharmonic_at(self, shape, strains, closed):
-        """What reduced.potential's anharmonic forms are made of around free states with these strains (n, 6)."""
+        """What reduced.potential's anharmonic forms are made of around free states with these strains (n,
+        6)."""
         return self.anharmonic.at(self.coordinates.around_inputs(shape, strains, closed), cosine(shape))
 
     def half_width(self, shape, pressure):
@@ -91,8 +96,9 @@ class KindLaw:
         return self.quantile * self.path.spread(shape, np.maximum(pressure, LOWEST), self.level)
 
     def excess(self, shape, pressure):
-        """(n, r + 2) how far a design lies outside what the law was taught: of each of Coordinates.ranged in widths of its range, of the
-        free states' deviation in units of the largest that counts as known, and of log P beyond the end of their path; 0 inside."""
+        """(n, r + 2) how far a design lies outside what the law was taught: of each of Coordinates.ranged in
+        widths of its range, of the free states' deviation in units of the largest that counts as known, and
+        of log P beyond the end of their path; 0 inside."""
         pressure = np.maximum(pressure, LOWEST)
         x = self._ranged(shape, pressure)
         width = np.maximum(self.high - self.low, 1.0)  # a level's may be 0
@@ -112,12 +118,21 @@ class RodLaw(SegmentLaw):
     def _kind(self, segment):
         if segment.kind not in self.kinds:
             known = " and ".join(self.kinds)
-            raise InputError(f"kind = '{segment.kind}': the law '{self.name}' knows {known} segments only: take --law analytic")
+            raise InputError(
+                f"kind = '{segment.kind}': the law '{self.name}' knows {known} segments only: take --law"
+                " analytic"
+            )
         return self.kinds[segment.kind]
 
     def of(self, segment):
         """The SectionLaw of a Segment; InputError for a kind that it was not taught."""
-        return SectionLaw(self._kind(segment), shape_numbers(segment), normal_pitch(segment), segment.material.mu, _ties(segment))
+        return SectionLaw(
+            self._kind(segment),
+            shape_numbers(segment),
+            normal_pitch(segment),
+            segment.material.mu,
+            _ties(segment),
+        )
 
     def strains(self, segment, pressure):
         """RodStrains with e, k of shape pressure.shape + (3,); pressure in MPa, a number or an array."""
@@ -143,11 +158,15 @@ class RodLaw(SegmentLaw):
         return RodStrains(found.e[:, 0], found.k[:, 0])
 
     def excess(self, segment, pressure):
-        """(r + 2,) how far a segment at a pressure (MPa) lies outside what the law was taught; KindLaw.excess."""
-        return self._kind(segment).excess(shape_numbers(segment)[None], np.array([pressure / segment.material.mu]))[0]
+        """(r + 2,) how far a segment at a pressure (MPa) lies outside what the law was taught;
+        KindLaw.excess."""
+        return self._kind(segment).excess(
+            shape_numbers(segment)[None], np.array([pressure / segment.material.mu])
+        )[0]
 
     def doubts(self, segment, pressure):
-        """Reasons, as text, not to trust the law for a segment at a pressure (MPa) or several; () when there are none."""
+        """Reasons, as text, not to trust the law for a segment at a pressure (MPa) or several; () when there
+        are none."""
         return self.of(segment).doubts(pressure)
 
 
@@ -166,11 +185,16 @@ class SectionLaw:
         object.__setattr__(self, "_known", lru_cache(maxsize=64)(self._free_state))
 
     def _free_state(self, *pressures):
-        """(free strains (n, 6), M (n, 6, 6), D1 (n,), cubic (n, 6, 36), quartic (n, 36, 36)) without dimension at pressures in MPa."""
+        """(free strains (n, 6), M (n, 6, 6), D1 (n,), cubic (n, 6, 36), quartic (n, 36, 36)) without
+        dimension at pressures in MPa."""
         shape, p = self._rows(pressures)
         free = self.law.free_strains(shape, p)
         closed = self.law.closed(shape, p, free)
-        return free, *whitening(self.law.kind, self.law.stiffness_at(shape, free, closed)), *self.law.anharmonic_at(shape, free, closed)
+        return (
+            free,
+            *whitening(self.law.kind, self.law.stiffness_at(shape, free, closed)),
+            *self.law.anharmonic_at(shape, free, closed),
+        )
 
     def _rows(self, P):
         p = np.atleast_1d(np.asarray(P, float)).ravel() / self.mu
@@ -200,7 +224,10 @@ class SectionLaw:
             reasons = ["the trained law knows no design near this one"]
         if excess[:, -1].max() > 0:
             limit = self.mu * (p * np.exp(-excess[:, -1]))[excess[:, -1] > 0].min()
-            reasons.append(f"the trained law sees a limit load, or no further, at {1e3 * limit:.3g} kPa: strains are those there")
+            reasons.append(
+                f"the trained law sees a limit load, or no further, at {1e3 * limit:.3g} kPa: strains are"
+                " those there"
+            )
         return self.remarks + tuple(reasons)
 
     def _state(self, q, P):
@@ -219,7 +246,9 @@ class SectionLaw:
     def psi(self, q, P):
         """(...,) enthalpy per undeformed length, N; 0 at the free state."""
         lead, v, _, D1, tensors = self._state(q, P)
-        return (self.mu * self.length**2 * D1 * ((v**2).sum(axis=1) / 2 + anharmonic_value(v, tensors))).reshape(lead)
+        return (
+            self.mu * self.length**2 * D1 * ((v**2).sum(axis=1) / 2 + anharmonic_value(v, tensors))
+        ).reshape(lead)
 
     def force(self, q, P):
         """(..., 6) gradient of psi: force (N) and moment (N mm) in the section frame."""
@@ -250,7 +279,10 @@ def _ties(segment):
     if s.layer_thickness:
         remarks.append("the law was trained without a bottom layer")
     if not isinstance(s.material, NeoHookean):
-        remarks.append(f"the law was trained on neo-Hookean material, not {s.material.law}: its initial modulus is taken ({SILICONES})")
+        remarks.append(
+            f"the law was trained on neo-Hookean material, not {s.material.law}: its initial modulus is taken"
+            f" ({SILICONES})"
+        )
     return tuple(remarks)
 
 
@@ -259,7 +291,8 @@ def _ties(segment):
 
 #: fields of the Gaussian processes side by side that are the same in all of them
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
-#: what only deviations need, most of the file, in as few digits as they take (measured: ways in half precision change them by 2e-7)
+#: what only deviations need, most of the file, in as few digits as they take (measured: ways in half
+#: precision change them by 2e-7)
 SHORT = {"observed": "f4", "ways": "f2", "trust": "f4", "group": "i4", "at": "i4"}
 PROCESSES = ("closing", "path", "start", "stiffness", "contact")
 ANHARMONIC = ("coefficients", "centre", "width", "reach")
@@ -274,11 +307,23 @@ def write_law(path, law):
         for name, found in zip(PROCESSES, known):
             for number, process in enumerate(found.processes if found else ()):
                 for f in fields(GaussianProcess):
-                    arrays[_key(kind, name, number, f.name)] = np.asarray(getattr(process, f.name), SHORT.get(f.name))
+                    arrays[_key(kind, name, number, f.name)] = np.asarray(
+                        getattr(process, f.name), SHORT.get(f.name)
+                    )
         arrays[f"{kind}/furthest"] = np.asarray(k.path.furthest)
-        arrays |= {f"{kind}/{name}": np.asarray(getattr(k, name)) for name in ("quantile", "low", "high", "doubt", "level")}
-        arrays |= {f"{kind}/anharmonic/{name}": np.asarray(getattr(k.anharmonic, name)) for name in ANHARMONIC}
-    about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": {k: list(v) for k, v in LENGTHS.items()}, **law.about}
+        arrays |= {
+            f"{kind}/{name}": np.asarray(getattr(k, name))
+            for name in ("quantile", "low", "high", "doubt", "level")
+        }
+        arrays |= {
+            f"{kind}/anharmonic/{name}": np.asarray(getattr(k.anharmonic, name)) for name in ANHARMONIC
+        }
+    about = {
+        "kinds": list(law.kinds),
+        "shape": list(SHAPE),
+        "lengths": {k: list(v) for k, v in LENGTHS.items()},
+        **law.about,
+    }
     write_archive(path, SCHEMA, about, arrays, compress=True)
 
 
@@ -289,7 +334,8 @@ def _key(kind, name, number, field):
 def read_law(path, name=None):
     """The RodLaw in a file, by default named like it; InputError when it is none or of another version."""
     with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, archive):
-        stored = {key: archive[key] for key in archive.files}  # what processes have in common is inflated once
+        # what processes have in common is inflated once
+        stored = {key: archive[key] for key in archive.files}
         return RodLaw({kind: _read_kind(stored, kind) for kind in about["kinds"]}, about, name or str(path))
 
 
@@ -302,7 +348,9 @@ def _read_kind(stored, kind):
             values |= {field: number_type(values[field]) for field, number_type in NUMBERS.items()}
             processes[name].append(GaussianProcess(**values))
             number += 1
-    closing, learned, start, *of_stiffness = (SideBySide(tuple(found)) if found else None for found in processes.values())
+    closing, learned, start, *of_stiffness = (
+        SideBySide(tuple(found)) if found else None for found in processes.values()
+    )
     path = FreePath(kind, Closing(kind, closing), learned, start, float(stored[f"{kind}/furthest"]))
     stiffness = FreeStiffness(kind, *of_stiffness)
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}

@@ -1,11 +1,12 @@
-"""What a trained law learns instead of strains and stiffness: smooth numbers of order one that keep the body's symmetries.
+"""What a trained law learns instead of strains and stiffness: smooth numbers of order one that keep the
+body's symmetries.
 
-All without dimension (base.dataset): pressure P/mu, strains q = (e, k l). With c = cos(angle), mirror images have opposite c, and
-every quantity is even or odd in c: e2, k1 and k3 change sign in the mirror. Odd ones are c times an even function, which is
-learned as a function of c^2 and the logarithms of the lengths: what makes a design soft is a product of powers. The free strains
-are led by the one that never vanishes, the curvature k2 of a one-sided, the stretch of a twisting segment; the others are divided
-by it. The stiffness is L D L^T by the
-blocks that the half turns of the body leave: unit lower triangular L and log D.
+All without dimension (base.dataset): pressure P/mu, strains q = (e, k l). With c = cos(angle), mirror images
+have opposite c, and every quantity is even or odd in c: e2, k1 and k3 change sign in the mirror. Odd ones are
+c times an even function, which is learned as a function of c^2 and the logarithms of the lengths: what makes
+a design soft is a product of powers. The free strains are led by the one that never vanishes, the curvature
+k2 of a one-sided, the stretch of a twisting segment; the others are divided by it. The stiffness is L D L^T
+by the blocks that the half turns of the body leave: unit lower triangular L and log D.
 """
 
 from dataclasses import dataclass
@@ -23,11 +24,16 @@ REST = np.eye(6)[0]
 SMALL_PRESSURE = 0.01
 #: the same of the leading strain
 SMALL_STRAIN = 0.1
-#: what loads a cell and what holds it: kind -> name -> sum of Segment's lengths; as many as the sample varies on their own.
-#: (Measured: a tenth off the error of the free strains against the lengths themselves.)
+#: what loads a cell and what holds it: kind -> name -> sum of Segment's lengths; as many as the sample varies
+#: on their own. (Measured: a tenth off the error of the free strains against the lengths themselves.)
 _OF_BOTH = {
     "width": {"width": 1},
-    "cavity's rise over the core": {"cavity_floor": 1, "chamber_height": 1, "channel_height": -0.5, "roof": -1},
+    "cavity's rise over the core": {
+        "cavity_floor": 1,
+        "chamber_height": 1,
+        "channel_height": -0.5,
+        "roof": -1,
+    },
     "cavity_thickness": {"cavity_thickness": 1},
     "wall": {"wall": 1},
     "top_wall": {"top_wall": 1},
@@ -36,10 +42,14 @@ _OF_BOTH = {
 }
 LENGTHS = {
     ONE_SIDED: _OF_BOTH | {"core's height": {"base_thickness": 1, "channel_height": 1, "roof": 1}},
-    TWISTING: _OF_BOTH | {"core's half height": {"channel_height": 0.5, "roof": 1}, "cavity_floor": {"cavity_floor": 1}},
+    TWISTING: _OF_BOTH
+    | {"core's half height": {"channel_height": 0.5, "roof": 1}, "cavity_floor": {"cavity_floor": 1}},
 }
 #: kind -> lengths that the sample varies and that LENGTHS knows only in sums
-IN_SUMS = {ONE_SIDED: ("chamber_height", "gap", "base_thickness"), TWISTING: ("chamber_height", "gap", "roof")}
+IN_SUMS = {
+    ONE_SIDED: ("chamber_height", "gap", "base_thickness"),
+    TWISTING: ("chamber_height", "gap", "roof"),
+}
 #: of a normal pitch; lengths that are smaller, or negative, count as this
 SMALLEST = 1e-3
 #: of a ratio whose logarithm is taken; and part of the gap over which walls come to touch
@@ -61,28 +71,32 @@ class Coordinates:
     kind: str
 
     def inputs(self, shape, pressure, level):
-        """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a number."""
+        """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a
+        number."""
         x = np.empty((len(shape), len(LENGTHS[self.kind]) + 3))
         x[:, 0], x[:, -2], x[:, -1] = cosine(shape) ** 2, np.log(pressure + SMALL_PRESSURE), level
-        # not out=: numpy's logarithm into strided memory differs in the last bit with where that memory happens to lie
+        # not out=: numpy's logarithm into strided memory differs in the last bit with where that memory
+        # happens to lie
         x[:, 1:-2] = np.log(self._lengths(shape))
         return x
 
     def ranged(self, shape, pressure, level):
-        """(n, r) what the training designs' ranges are told of: the inputs, and the logarithms of the lengths that those know only in
-        sums."""
+        """(n, r) what the training designs' ranges are told of: the inputs, and the logarithms of the lengths
+        that those know only in sums."""
         apart = np.log(np.maximum(shape[:, [SHAPE.index(name) for name in IN_SUMS[self.kind]]], SMALLEST))
         return np.hstack([self.inputs(shape, pressure, level), apart])
 
     def path_inputs(self, shape, lead, level, overlap):
-        """(n, d + 1) the same with the leading strain (n,) in the place of the pressure, and `overlap_input` (n,)."""
+        """(n, d + 1) the same with the leading strain (n,) in the place of the pressure, and `overlap_input`
+        (n,)."""
         x = self.inputs(shape, np.zeros(len(shape)), level)
         x[:, -2] = np.log(lead + SMALL_STRAIN)
         return np.column_stack([x, self.overlap_input(overlap)])
 
     @staticmethod
     def overlap_input(overlap):
-        """(n,) regression input of by how much walls would overlap (n,), in normal pitches: the same for all that are apart."""
+        """(n,) regression input of by how much walls would overlap (n,), in normal pitches: the same for all
+        that are apart."""
         return np.log(np.maximum(overlap, 0) + SMALL_OVERLAP)
 
     @staticmethod
@@ -96,13 +110,15 @@ class Coordinates:
         return strains[:, lead] - REST[lead]
 
     def closing_load(self, pressure, lead):
-        """(n,) what walls close in proportion to, almost: the leading strain of a one-sided, the pressure of a twisting segment, whose
-        stretch opens the gaps while its walls bulge. (Measured, of the load at which walls touch: the 90th percentile of the error is 9
-        and 7 % of the top one; the other way round 20 and 15 %.)"""
+        """(n,) what walls close in proportion to, almost: the leading strain of a one-sided, the pressure of
+        a twisting segment, whose stretch opens the gaps while its walls bulge. (Measured, of the load at
+        which walls touch: the 90th percentile of the error is 9 and 7 % of the top one; the other way round
+        20 and 15 %.)"""
         return lead if self.kind == ONE_SIDED else pressure
 
     def closing_inputs(self, shape, load):
-        """(n, d - 1) regression inputs of how far walls close over the load (n,): the same, whatever the mesh."""
+        """(n, d - 1) regression inputs of how far walls close over the load (n,): the same, whatever the
+        mesh."""
         return self.with_load(self.inputs(shape, np.zeros(len(shape)), 0), load)
 
     def with_load(self, inputs, load):
@@ -110,22 +126,23 @@ class Coordinates:
         return np.concatenate([inputs[:, : len(LENGTHS[self.kind]) + 1], load[:, None]], axis=1)
 
     def stiffness_inputs(self, shape, strains, level):
-        """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place of the pressure. (What
-        softens a cell is how far it has gone; measured: a fifth off the error.)"""
+        """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place
+        of the pressure. (What softens a cell is how far it has gone; measured: a fifth off the error.)"""
         x = self.inputs(shape, np.zeros(len(shape)), level)
         x[:, -2] = self.leading(strains)
         return x
 
     def contact_inputs(self, shape, strains, closed):
-        """(n, d) those of what contact adds to it, the same, whatever the mesh: by how much walls would overlap, having `closed` (n,)
-        so much of their gap, in the mesh's place."""
+        """(n, d) those of what contact adds to it, the same, whatever the mesh: by how much walls would
+        overlap, having `closed` (n,) so much of their gap, in the mesh's place."""
         x = self.stiffness_inputs(shape, strains, 0)
         x[:, -1] = self.overlap_input((closed - 1) * shape[:, GAP])
         return x
 
     @staticmethod
     def touch(closed):
-        """(n,) from 0 to 1, whether walls touch that have closed so much (n,) of their gap, as if they could go on."""
+        """(n,) from 0 to 1, whether walls touch that have closed so much (n,) of their gap, as if they could
+        go on."""
         return 1 / (1 + np.exp(-np.clip(np.log(np.maximum(closed, TINY)) / TOUCH_WIDTH, -30, 30)))
 
     def around_inputs(self, shape, strains, closed):
@@ -147,14 +164,20 @@ class Coordinates:
     @property
     def names(self):
         """What `told` gives."""
-        lengths, apart = ([f"{name} / normal pitch" for name in names] for names in (LENGTHS[self.kind], IN_SUMS[self.kind]))
+        lengths, apart = (
+            [f"{name} / normal pitch" for name in names] for names in (LENGTHS[self.kind], IN_SUMS[self.kind])
+        )
         return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh", *apart]
 
     def told(self, ranged):
         """(r,) `ranged` (r,) as a user knows it: degrees, ratios."""
-        squared_cosine, lengths, pressure, level, apart = np.split(ranged, [1, *(1 + len(LENGTHS[self.kind]) + np.arange(3))])
+        squared_cosine, lengths, pressure, level, apart = np.split(
+            ranged, [1, *(1 + len(LENGTHS[self.kind]) + np.arange(3))]
+        )
         angle = np.degrees(np.arccos(np.sqrt(squared_cosine)))
-        return np.concatenate([angle, np.exp(lengths), np.maximum(np.exp(pressure) - SMALL_PRESSURE, 0), level, np.exp(apart)])
+        return np.concatenate(
+            [angle, np.exp(lengths), np.maximum(np.exp(pressure) - SMALL_PRESSURE, 0), level, np.exp(apart)]
+        )
 
     # ---- free strains
     @cached_property
@@ -164,7 +187,8 @@ class Coordinates:
         return MIRROR[[lead, *others]]
 
     def learned_strains(self, shape, pressure, strains):
-        """(n, p) from strains (n, 6) at P > 0: the logarithm of the pressure over the leading one, and the others over that."""
+        """(n, p) from strains (n, 6) at P > 0: the logarithm of the pressure over the leading one, and the
+        others over that."""
         lead, others = LEADING[self.kind]
         q = strains - REST
         ratios = q[:, others] / q[:, [lead]] / odd(self.strain_parity[1:], cosine(shape))
@@ -174,7 +198,9 @@ class Coordinates:
         """(n, 6) of the leading strain (n,) and the others' learned ratios (n, p - 1)."""
         of_lead, of_others = self._places
         lead = lead[:, None]
-        return REST + lead * of_lead + (lead * ratios * odd(self.strain_parity[1:], cosine(shape))) @ of_others
+        return (
+            REST + lead * of_lead + (lead * ratios * odd(self.strain_parity[1:], cosine(shape))) @ of_others
+        )
 
     @cached_property
     def _places(self):
@@ -183,22 +209,26 @@ class Coordinates:
         return np.eye(6)[first], np.eye(6)[list(others)]
 
     def by_shape(self, shape, slopes):
-        """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, .) by inputs, those by others than the shape
-        left out; one more, 0, for the pressure."""
+        """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, .) by inputs,
+        those by others than the shape left out; one more, 0, for the pressure."""
         by = np.zeros((*slopes.shape[:2], len(SHAPE) + 1))
-        by[:, :, :-1] = (slopes[:, :, 1 : len(LENGTHS[self.kind]) + 1] / self._lengths(shape)[:, None]) @ self._sums.T
+        by[:, :, :-1] = (
+            slopes[:, :, 1 : len(LENGTHS[self.kind]) + 1] / self._lengths(shape)[:, None]
+        ) @ self._sums.T
         by[:, :, 0] = slopes[:, :, 0] * (2 * cosine(shape) * _by_angle(shape))[:, None]
         return by
 
     def strain_slopes(self, shape, lead, ratios, by_ratios, by_lead):
-        """(n, 6, 14) derivatives of `strains` by the shape numbers and P/mu, of those (n, p - 1, 14) of the ratios and (n, 14) of the
-        leading strain."""
+        """(n, 6, 14) derivatives of `strains` by the shape numbers and P/mu, of those (n, p - 1, 14) of the
+        ratios and (n, 14) of the leading strain."""
         first, others = LEADING[self.kind]
         out, c = np.zeros((len(lead), 6, len(SHAPE) + 1)), cosine(shape)
         out[:, first] = by_lead
         for j, (i, parity) in enumerate(zip(others, self.strain_parity[1:])):
             factor = c if parity < 0 else np.ones(len(lead))
-            out[:, i] = (factor * lead)[:, None] * by_ratios[:, j] + (factor * ratios[:, j])[:, None] * by_lead
+            out[:, i] = (factor * lead)[:, None] * by_ratios[:, j] + (factor * ratios[:, j])[
+                :, None
+            ] * by_lead
             if parity < 0:
                 out[:, i, 0] += _by_angle(shape) * ratios[:, j] * lead
         return out
@@ -224,7 +254,8 @@ class Coordinates:
             start += len(block) * (len(block) + 1) // 2
 
     def learned_stiffness(self, shape, matrices):
-        """(n, p) from stiffness (n, 6, 6), of which what the symmetries forbid is left out. Not positive definite: nan."""
+        """(n, p) from stiffness (n, 6, 6), of which what the symmetries forbid is left out. Not positive
+        definite: nan."""
         c, out = cosine(shape), []
         for block in BLOCKS[self.kind]:
             K = matrices[:, block][:, :, block]

@@ -1,7 +1,7 @@
 """Energies of thin walls and volumes, with exact first and second derivatives.
 
-Each law takes rows of arguments (n, m) and returns value (n,), gradient (n, m) and Hessian (n, m, m). Energies are of
-the incompressible neo-Hookean solid in plane stress, per volume and in units of mu/2.
+Each law takes rows of arguments (n, m) and returns value (n,), gradient (n, m) and Hessian (n, m, m).
+Energies are of the incompressible neo-Hookean solid in plane stress, per volume and in units of mu/2.
 """
 
 import numpy as np
@@ -44,7 +44,8 @@ def panel(a):
 
 
 def bulged_wall(a):
-    """Wall stretched by a1 and a2 along its edges and bulging out of its plane with slopes a3 and a4 along them.
+    """Wall stretched by a1 and a2 along its edges and bulging out of its plane with slopes a3 and a4 along
+    them.
 
     tr C + 1/det C - 3 with C = [[a1^2 + a3^2, a3 a4], [a3 a4, a2^2 + a4^2]].
     """

@@ -1,4 +1,5 @@
-"""From segments to shapes: what a law of a segment is, the analytic one, and the prediction of a manipulator."""
+"""From segments to shapes: what a law of a segment is, the analytic one, and the prediction of a
+manipulator."""
 
 from abc import ABC, abstractmethod
 from functools import lru_cache
@@ -28,7 +29,8 @@ class SegmentLaw(ABC):
         return RodStrains([q.e for q in found], [q.k for q in found])
 
     def table(self, segments, pressures):
-        """RodStrains (n, m, 3) of n segments at increasing pressures (m,) in MPa; nan from where there is no equilibrium."""
+        """RodStrains (n, m, 3) of n segments at increasing pressures (m,) in MPa; nan from where there is no
+        equilibrium."""
         e, k = np.full((2, len(segments), len(pressures), 3), np.nan)
         for i, segment in enumerate(segments):
             for j, pressure in enumerate(pressures):
@@ -44,7 +46,8 @@ class SegmentLaw(ABC):
         return np.zeros(1)
 
     def doubts(self, segment, pressure):
-        """Reasons, as text, not to trust the law for a segment at a pressure or several; () when there are none."""
+        """Reasons, as text, not to trust the law for a segment at a pressure or several; () when there are
+        none."""
         return ()
 
 
@@ -59,8 +62,8 @@ def checked_pressure(pressure):
 class AnalyticModel(SegmentLaw):
     """The two analytic laws: the twisting tube and the one-sided minimum-potential-energy cell.
 
-    Nothing in them is fitted to finite elements. The twisting tube's E_t is 3 mu, the modulus of the solid walls along
-    the chambers; Ri and Ro are the equivalent radii.
+    Nothing in them is fitted to finite elements. The twisting tube's E_t is 3 mu, the modulus of the solid
+    walls along the chambers; Ri and Ro are the equivalent radii.
     """
 
     name = "analytic"
@@ -98,8 +101,8 @@ def _twisting_law(segment):
     tube = segment_tube(segment)
 
     def strains(pressures):
-        # Seen from outside, a chamber at angle theta runs along (cos, -sin) on (Z, Psi): y points against the hoop
-        # direction on top. The chambers are fibres of angle -theta, whose tau is the opposite.
+        # Seen from outside, a chamber at angle theta runs along (cos, -sin) on (Z, Psi): y points against the
+        # hoop direction on top. The chambers are fibres of angle -theta, whose tau is the opposite.
         _, stretch, tau = tube.solve(segment.angle, pressures)
         e, k = np.zeros((2, len(pressures), 3))
         e[:, 0], k[:, 0] = stretch, -tau * stretch
@@ -109,7 +112,8 @@ def _twisting_law(segment):
 
 
 def predict(manipulator, pressure, law, spacing=1.0, base_pose=None):
-    """The Centreline of a free manipulator at `pressure` (MPa) by a SegmentLaw, end effects included (reduced.ends).
+    """The Centreline of a free manipulator at `pressure` (MPa) by a SegmentLaw, end effects included
+    (reduced.ends).
 
     spacing in mm; base_pose (4, 4) the base frame, default the identity.
     """
@@ -119,7 +123,8 @@ def predict(manipulator, pressure, law, spacing=1.0, base_pose=None):
 
 
 def doubts(manipulator, pressure, law):
-    """Lines of text, one a reason, not to trust a SegmentLaw for the manipulator at a pressure (MPa) or several."""
+    """Lines of text, one a reason, not to trust a SegmentLaw for the manipulator at a pressure (MPa) or
+    several."""
     who = {}
     for i, segment in enumerate(manipulator.segments, start=1):
         for reason in law.doubts(segment, pressure):

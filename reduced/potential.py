@@ -1,10 +1,12 @@
-"""The enthalpy around a free state: a quadratic form, and a cubic and quartic one that varies little between designs.
+"""The enthalpy around a free state: a quadratic form, and a cubic and quartic one that varies little between
+designs.
 
 With K = L D L^T the stiffness of the free state (D's first entry D1 belongs to e1) and d = q - q_free,
     psi = D1 (|v|^2 / 2 + sum over monomials m of c_m(c) v^m),   v = sqrt(D/D1) L^T d.
-In v the anharmonic part of very different cells is nearly the same; its coefficients are linear in what the stiffness is learned from
-(measured: a third off the error of forces in one-sided segments). Monomials that the half turns of the body forbid are left
-out; those that are odd in the mirror image carry c = cos(angle). Without dimension throughout.
+In v the anharmonic part of very different cells is nearly the same; its coefficients are linear in what the
+stiffness is learned from (measured: a third off the error of forces in one-sided segments). Monomials that
+the half turns of the body forbid are left out; those that are odd in the mirror image carry c = cos(angle).
+Without dimension throughout.
 """
 
 from dataclasses import dataclass
@@ -16,14 +18,16 @@ import numpy as np
 from reduced.law_coordinates import BLOCKS, MIRROR, odd
 
 DEGREES = (3, 4)
-#: added to the normal equations of relative forces, for constant parts and for slopes: keeps what nothing determines small
+#: added to the normal equations of relative forces, for constant parts and for slopes: keeps what nothing
+#: determines small
 RIDGE = 1e-4, 1e-2
 #: standard deviations of the inputs beyond which coefficients stay as they are
 FURTHEST = 2.0
 
 
 def monomials(kind):
-    """[(indices, ...)] of the degrees, only those that every half turn leaves alone: even in each block but the first."""
+    """[(indices, ...)] of the degrees, only those that every half turn leaves alone: even in each block but
+    the first."""
     out = []
     for degree in DEGREES:
         for m in combinations_with_replacement(range(6), degree):
@@ -44,11 +48,11 @@ def whitening(kind, K):
 
 @dataclass(frozen=True)
 class Anharmonic:
-    """coefficients (m, 1 + f) of `monomials(kind)`, constant and by inputs x (f,) from `centre` in units of `width`, times cos(angle)
-    where odd in the mirror; reach: largest |v| it was trained on.
+    """coefficients (m, 1 + f) of `monomials(kind)`, constant and by inputs x (f,) from `centre` in units of
+    `width`, times cos(angle) where odd in the mirror; reach: largest |v| it was trained on.
 
-    Evaluated as symmetric tensors of second derivatives: that of a form of degree n is its Hessian, twice contracted n (n - 1) times
-    its value.
+    Evaluated as symmetric tensors of second derivatives: that of a form of degree n is its Hessian, twice
+    contracted n (n - 1) times its value.
     """
 
     kind: str
@@ -72,7 +76,8 @@ class Anharmonic:
         return out
 
     def at(self, x, c):
-        """Tensors (cubic (n, 6, 36), quartic (n, 36, 36)) of free states with inputs x (n, f) and cos(angle) (n,)."""
+        """Tensors (cubic (n, 6, 36), quartic (n, 36, 36)) of free states with inputs x (n, f) and cos(angle)
+        (n,)."""
         by_state = features(x, self.centre, self.width) @ self.coefficients.T * odd(_parity(self.kind), c)
         cubic, quartic = self._tensors
         parts = by_state[:, : len(cubic)] @ cubic, by_state[:, len(cubic) :] @ quartic
@@ -85,7 +90,8 @@ def features(x, centre, width):
 
 
 def _hessians(v, tensors):
-    """Hessians (n, 6, 6) of the cubic and of the quartic part at v (n, 6); tensors: of `Anharmonic.at`, for each or for all."""
+    """Hessians (n, 6, 6) of the cubic and of the quartic part at v (n, 6); tensors: of `Anharmonic.at`, for
+    each or for all."""
     squares = (v[:, :, None] * v[:, None, :]).reshape(-1, 36)
     return [(a[:, None, :] @ tensor)[:, 0].reshape(-1, 6, 6) for a, tensor in zip((v, squares), tensors)]
 
@@ -117,14 +123,18 @@ def _gradients(kind, v, c):
     listed = monomials(kind)
     powers = np.array([[m.count(i) for i in range(6)] for m in listed])
     out = np.stack(
-        [powers[:, i] * np.prod(v[:, None, :] ** np.maximum(powers - np.eye(6, dtype=int)[i], 0), axis=2) for i in range(6)], axis=2
+        [
+            powers[:, i] * np.prod(v[:, None, :] ** np.maximum(powers - np.eye(6, dtype=int)[i], 0), axis=2)
+            for i in range(6)
+        ],
+        axis=2,
     )
     return out * odd(_parity(kind), c)[:, :, None]
 
 
 def fit_anharmonic(kind, x, c, K, change, forces, ridge=RIDGE):
-    """The Anharmonic whose gradient gives the forces (n, 6) at changes (n, 6) from free states of inputs x (n, f), cos(angle) c (n,) and
-    stiffness K (n, 6, 6).
+    """The Anharmonic whose gradient gives the forces (n, 6) at changes (n, 6) from free states of inputs x
+    (n, f), cos(angle) c (n,) and stiffness K (n, 6, 6).
 
     Each state weighs the same, whatever its force: errors are relative.
     """
@@ -139,4 +149,6 @@ def fit_anharmonic(kind, x, c, K, change, forces, ridge=RIDGE):
     b = ((wanted - v) / size).ravel()
     gram, own = A.T @ A, np.tile(np.repeat(ridge, [1, x.shape[1]]), len(monomials(kind)))
     weights = np.linalg.solve(gram + np.diag(own), A.T @ b)
-    return Anharmonic(kind, weights.reshape(len(monomials(kind)), -1), centre, width, float(np.linalg.norm(v, axis=1).max()))
+    return Anharmonic(
+        kind, weights.reshape(len(monomials(kind)), -1), centre, width, float(np.linalg.norm(v, axis=1).max())
+    )

@@ -1,8 +1,8 @@
 """The paper's twisting equations as printed (Eqs 5-21), and what its printed constants give.
 
 `/usr/bin/python3 -m reduced.printed` prints both. The equations have no solution: with uniform lambda_psi =
-lambda_z^-1/2 and a constant multiplier the three conditions contradict one another, and without c1 mu lambda_psi^2 in
-Eq. 11 not even P = 0 leaves the tube at rest. The consistent form is reduced/twisting.py.
+lambda_z^-1/2 and a constant multiplier the three conditions contradict one another, and without c1 mu
+lambda_psi^2 in Eq. 11 not even P = 0 leaves the tube at rest. The consistent form is reduced/twisting.py.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,8 @@ MULTIPLIERS = ("unknown", "pressure")
 
 @dataclass(frozen=True)
 class PrintedResult:
-    """Best attempt at the printed equations; residual of Eqs 19, 20, 21 relative to P, P pi Ri^2, P pi Ri^3."""
+    """Best attempt at the printed equations; residual of Eqs 19, 20, 21 relative to P, P pi Ri^2, P pi
+    Ri^3."""
 
     solved: bool
     unknowns: dict
@@ -28,12 +29,17 @@ class PrintedResult:
 
     def __str__(self):
         state = ", ".join(f"{k} = {v:.4g}" for k, v in self.unknowns.items())
-        head = "solution" if self.solved else f"no solution in the physical range ({self.starts} starts); least residual"
+        head = (
+            "solution"
+            if self.solved
+            else f"no solution in the physical range ({self.starts} starts); least residual"
+        )
         return f"{head}: |residual| = {np.linalg.norm(self.residual):.3g} at {state}"
 
 
 def printed_residual(tube, angle, pressure, tau, stretch, multiplier):
-    """Eqs 19-21 as printed (3,): lambda_psi = lambda_z^-1/2, Eq. 11 without c1 mu lambda_psi^2, cos on the hoop.
+    """Eqs 19-21 as printed (3,): lambda_psi = lambda_z^-1/2, Eq. 11 without c1 mu lambda_psi^2, cos on the
+    hoop.
 
     `multiplier` stands where Eqs 10-12 print P.
     """
@@ -63,9 +69,9 @@ def printed_residual(tube, angle, pressure, tau, stretch, multiplier):
 def printed_equations(tube, angle, pressure, multiplier="unknown", seed=0):
     """Try to solve the paper's printed Eqs 5-21 and report; pressure > 0 in MPa, angle in degrees.
 
-    multiplier: 'unknown' takes the letter P in Eqs 10-12 for the constant multiplier p, one of the paper's three
-    unknowns; 'pressure' takes it literally. Least squares from many starting points over the physical range
-    (|tau| <= 0.2 rad/mm, 0.5 <= lambda <= 2.5, |p| <= 2 MPa).
+    multiplier: 'unknown' takes the letter P in Eqs 10-12 for the constant multiplier p, one of the paper's
+    three unknowns; 'pressure' takes it literally. Least squares from many starting points over the physical
+    range (|tau| <= 0.2 rad/mm, 0.5 <= lambda <= 2.5, |p| <= 2 MPa).
     """
     if not pressure > 0:
         raise InputError(f"pressure = {pressure:g} MPa must be larger than 0")
@@ -97,7 +103,8 @@ def printed_equations(tube, angle, pressure, multiplier="unknown", seed=0):
 
 
 def largest_twist(tube, angles=range(30, 90, 5), step=1e-3, highest=0.2):
-    """(tau, angle, pressure) of the largest |tau| that the consistent form reaches below its limit load, rad/mm."""
+    """(tau, angle, pressure) of the largest |tau| that the consistent form reaches below its limit load,
+    rad/mm."""
     best = (0.0, 0.0, 0.0)
     for angle in angles:
         for pressure in np.arange(step, highest, step):
@@ -114,7 +121,10 @@ def main():
         tube = TwistingTube(3.0, 7.0, twisting.PAPER_MU, fibre_modulus)
         tau, angle, pressure = largest_twist(tube, range(30, 90, 10), 2e-3)
         print(f"Ri = 3 mm, Ro = 7 mm, mu = {tube.mu} MPa, E_t = {fibre_modulus:g} MPa")
-        print(f"  consistent form: largest |tau| {tau:.5f} rad/mm (angle {angle:g} deg, {pressure * 1e3:.0f} kPa)")
+        print(
+            f"  consistent form: largest |tau| {tau:.5f} rad/mm (angle {angle:g} deg, {pressure * 1e3:.0f}"
+            " kPa)"
+        )
         for multiplier in MULTIPLIERS:
             result = printed_equations(tube, 60.0, 0.02, multiplier)
             print(f"  printed equations, 60 deg, 20 kPa, P in Eqs 10-12 = {multiplier}: {result}")

@@ -1,8 +1,10 @@
-"""A rod of elements with constant strains: its energy, the balance of its nodes, and Newton's step, exact and in O(n).
+"""A rod of elements with constant strains: its energy, the balance of its nodes, and Newton's step, exact and
+in O(n).
 
-Unknown are the elements' twists x = (k, e) per undeformed length; element i moves the frame by exp(h x), so a change dx moves all
-behind it by the spatial twist A_i dx_i, A_i = h Ad(g_{i-1}) J(h x_i) (base.left_jacobian). In the nodes' spatial twists V_j, the
-sums of these, Newton's matrix is block tridiagonal: the step for x is found through them with one banded factorisation.
+Unknown are the elements' twists x = (k, e) per undeformed length; element i moves the frame by exp(h x), so a
+change dx moves all behind it by the spatial twist A_i dx_i, A_i = h Ad(g_{i-1}) J(h x_i)
+(base.left_jacobian). In the nodes' spatial twists V_j, the sums of these, Newton's matrix is block
+tridiagonal: the step for x is found through them with one banded factorisation.
 """
 
 import numpy as np
@@ -19,11 +21,15 @@ _BAND = 11  # block tridiagonal, blocks of 6
 
 
 class NodalLoads:
-    """Dead loads at the nodes 1..n, fixed in space: forces (n, 3) in N; spreads (n, 3, 3), the sum of r (x) f over the forces f that
-    act at points r (mm) of a node's section frame; moments (n, 3) in N mm."""
+    """Dead loads at the nodes 1..n, fixed in space: forces (n, 3) in N; spreads (n, 3, 3), the sum of r (x) f
+    over the forces f that act at points r (mm) of a node's section frame; moments (n, 3) in N mm."""
 
     def __init__(self, count):
-        self.forces, self.spreads, self.moments = np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))
+        self.forces, self.spreads, self.moments = (
+            np.zeros((count, 3)),
+            np.zeros((count, 3, 3)),
+            np.zeros((count, 3)),
+        )
 
     def add(self, node, force, point=(0.0, 0.0, 0.0)):
         """Forces (m, 3) at points (m, 3) of the frames of distinct nodes (m,)."""
@@ -36,7 +42,11 @@ class NodalLoads:
 
     def scaled(self, factor):
         out = NodalLoads(0)
-        out.forces, out.spreads, out.moments = factor * self.forces, factor * self.spreads, factor * self.moments
+        out.forces, out.spreads, out.moments = (
+            factor * self.forces,
+            factor * self.spreads,
+            factor * self.moments,
+        )
         return out
 
 
@@ -80,24 +90,35 @@ class RodElements:
         return out
 
     def energy(self, x, loads):
-        """Enthalpy of the sections less the work of the forces, N mm; moments fixed in space have no energy."""
+        """Enthalpy of the sections less the work of the forces, N mm; moments fixed in space have no
+        energy."""
         poses = self.poses(x)[1:]
-        return self.lengths @ self._by_law("psi", x, ()) - np.trace(_turned(poses, loads), axis1=1, axis2=2).sum()
+        return (
+            self.lengths @ self._by_law("psi", x, ())
+            - np.trace(_turned(poses, loads), axis1=1, axis2=2).sum()
+        )
 
     def gradient(self, x, loads):
-        """(n, 6) generalised forces that balance to zero: the energy's gradient by x, moments' work included."""
+        """(n, 6) generalised forces that balance to zero: the energy's gradient by x, moments' work
+        included."""
         poses = self.poses(x)
         outward = _outward(poses[1:], loads)[0]
-        return self.lengths[:, None] * self.wrenches(x) - (_transposed(self._carriers(x, poses)) @ outward[..., None])[..., 0]
+        return (
+            self.lengths[:, None] * self.wrenches(x)
+            - (_transposed(self._carriers(x, poses)) @ outward[..., None])[..., 0]
+        )
 
     def hessian(self, x, loads):
-        """(n, 6, n, 6) derivative of `gradient` by x, dense; symmetric for conservative loads. For tests and small rods."""
+        """(n, 6, n, 6) derivative of `gradient` by x, dense; symmetric for conservative loads. For tests and
+        small rods."""
         n, blocks = len(x), self._linearised(x, loads)[1]
         matrix = np.zeros((n, 6, n, 6))
         diagonal, lower, upper = blocks
         i = np.arange(n)
         matrix[i, :, i], matrix[i[1:], :, i[:-1]], matrix[i[:-1], :, i[1:]] = diagonal, lower, upper
-        nodes = np.einsum("ij,jab->iajb", np.tril(np.ones((n, n))), self._carriers(x, self.poses(x))).reshape(6 * n, 6 * n)
+        nodes = np.einsum("ij,jab->iajb", np.tril(np.ones((n, n))), self._carriers(x, self.poses(x))).reshape(
+            6 * n, 6 * n
+        )
         return (nodes.T @ matrix.reshape(6 * n, 6 * n) @ nodes).reshape(n, 6, n, 6)
 
     def _carriers(self, x, poses):
@@ -105,7 +126,8 @@ class RodElements:
         return self._h * (adjoint(poses[:-1]) @ LeftJacobian(x * self.lengths[:, None]).matrix)
 
     def _linearised(self, x, loads):
-        """(inverses of A, the tangent's blocks (diagonal, lower, upper) and the imbalance (n, 6) in the nodes' spatial twists)."""
+        """(inverses of A, the tangent's blocks (diagonal, lower, upper) and the imbalance (n, 6) in the
+        nodes' spatial twists)."""
         J = LeftJacobian(x * self.lengths[:, None])
         poses = self._chained(J.pose)
         Ad = adjoint(poses[:-1])
@@ -126,13 +148,17 @@ class RodElements:
         return inverse, (diagonal, -(M + C)[1:], -M[1:]), imbalance
 
     def newton_step(self, x, loads):
-        """(step (n, 6) for x, banded matrix in LAPACK's storage for `is_minimum`); None instead of the step when singular."""
+        """(step (n, 6) for x, banded matrix in LAPACK's storage for `is_minimum`); None instead of the step
+        when singular."""
         inverse, blocks, imbalance = self._linearised(x, loads)
         n = len(x)
-        band = np.zeros((6 * n, 3 * _BAND + 1))  # LAPACK's columns are these rows: entry (r, c) at [c, 2 _BAND + r - c]
+        # LAPACK's columns are these rows: entry (r, c) at [c, 2 _BAND + r - c]
+        band = np.zeros((6 * n, 3 * _BAND + 1))
         size, width = band.itemsize, band.shape[1]
         for block, first in zip(blocks, (2 * _BAND, 2 * _BAND + 6, 6 * width + 2 * _BAND - 6)):
-            as_strided(band.ravel()[first:], (len(block), 6, 6), (6 * width * size, size, (width - 1) * size))[...] = block
+            as_strided(
+                band.ravel()[first:], (len(block), 6, 6), (6 * width * size, size, (width - 1) * size)
+            )[...] = block
         kept = band[:, 2 * _BAND :].copy()
         _, _, V, info = dgbsv(_BAND, _BAND, band.T, -imbalance.ravel(), overwrite_ab=True)
         if info:
@@ -143,7 +169,8 @@ class RodElements:
 
 
 def is_minimum(band):
-    """Whether the tangent of `newton_step` is positive definite: the equilibrium is stable at these (conservative) loads."""
+    """Whether the tangent of `newton_step` is positive definite: the equilibrium is stable at these
+    (conservative) loads."""
     try:
         cholesky_banded(band.T, lower=True, check_finite=False)
     except LinAlgError:

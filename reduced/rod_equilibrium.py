@@ -1,4 +1,5 @@
-"""The way to a rod's equilibrium: Newton's method, load steps where a whole one fails, elements halved until the answer stands still."""
+"""The way to a rod's equilibrium: Newton's method, load steps where a whole one fails, elements halved until
+the answer stands still."""
 
 import numpy as np
 
@@ -6,12 +7,15 @@ from base.errors import ConvergenceError
 from reduced.rod_elements import NodalLoads, RodElements, is_minimum
 
 ITERATIONS = 12
-#: a Newton step turns the rod by at most so much, summed along it (rad), and strains it by at most so much; longer ones are shortened
+#: a Newton step turns the rod by at most so much, summed along it (rad), and strains it by at most so much;
+#: longer ones are shortened
 LARGEST_TURN, LARGEST_STRAIN = 2.0, 0.3
 SMALLEST_LOAD_STEP = 1 / 2048
-#: the coarsest elements: shares of the rod's length that turn less than this (rad) in the free state; and how often they are halved
+#: the coarsest elements: shares of the rod's length that turn less than this (rad) in the free state; and how
+#: often they are halved
 FIRST_ELEMENTS, FIRST_TURN, HALVINGS = 16, 0.4, 8
-#: rad, an element's turn beyond which finer ones are needed; so often are finer ones tried where no equilibrium is found
+#: rad, an element's turn beyond which finer ones are needed; so often are finer ones tried where no
+#: equilibrium is found
 LARGEST_ELEMENT_TURN, RETRIES = 3.0, 3
 
 
@@ -51,9 +55,11 @@ class Grid:
         return x[parent] + ((halves[parent] - 1) * (second - 0.5) / 2)[:, None] * slope[parent]
 
     def newton(self, x, factor, small):
-        """The equilibrium near x (n, 6) under `factor` of the loads, or None: not found, or (without moments) not stable.
+        """The equilibrium near x (n, 6) under `factor` of the loads, or None: not found, or (without moments)
+        not stable.
 
-        small: the step (strains, k times the length) after which to stop; the next one would be of the order of its square.
+        small: the step (strains, k times the length) after which to stop; the next one would be of the order
+        of its square.
         """
         loads, reach, h = self.loads.scaled(factor), self.s[-1], self.elements.lengths
         for _ in range(ITERATIONS):
@@ -70,7 +76,8 @@ class Grid:
         return None
 
     def follow(self, small, step=1.0):
-        """The equilibrium reached from the free state, the loads growing, from a first `step` on, as fast as Newton's method lets them."""
+        """The equilibrium reached from the free state, the loads growing, from a first `step` on, as fast as
+        Newton's method lets them."""
         x, before, reached = self.elements.free(), None, 0.0
         while reached < 1.0:
             aim = min(1.0, reached + step)
@@ -80,8 +87,9 @@ class Grid:
                 step = (aim - reached) / 2
                 if step < SMALLEST_LOAD_STEP:
                     raise ConvergenceError(
-                        f"rod: no stable equilibrium follows beyond {100 * reached:.4g} % of the loads: the rod buckles or snaps there; "
-                        "lower the loads, or disturb a perfect symmetry by a small side force"
+                        f"rod: no stable equilibrium follows beyond {100 * reached:.4g} % of the loads: the"
+                        " rod buckles or snaps there; lower the loads, or disturb a perfect symmetry by a"
+                        " small side force"
                     )
                 continue
             self.load_steps += 1
@@ -90,10 +98,12 @@ class Grid:
 
 
 def refine(rod, vectors, tolerance, first_load):
-    """(s (n + 1,), poses (n + 1, 4, 4), wrenches (n, 6), error in mm, iterations, load steps) of a rod's equilibrium.
+    """(s (n + 1,), poses (n + 1, 4, 4), wrenches (n, 6), error in mm, iterations, load steps) of a rod's
+    equilibrium.
 
-    vectors: see Grid. tolerance: of the length; first_load: share of the loads. The error of constant strains is of second order,
-    so an answer is three times nearer to the limit than to that of elements twice as long.
+    vectors: see Grid. tolerance: of the length; first_load: share of the loads. The error of constant strains
+    is of second order, so an answer is three times nearer to the limit than to that of elements twice as
+    long.
     """
     lengths, turn = rod.lengths, np.linalg.norm(rod.free_strains.k, axis=1)
     size = np.minimum(lengths.sum() / FIRST_ELEMENTS, FIRST_TURN / np.maximum(turn, 1e-12))
@@ -119,4 +129,6 @@ def refine(rod, vectors, tolerance, first_load):
             if error <= tolerance * lengths.sum():
                 return grid.s, poses, grid.elements.wrenches(x), error, iterations, load_steps
         before = grid, x, poses
-    raise ConvergenceError(f"rod: {len(x)} elements leave an error of {error:.2g} mm: ask for a larger tolerance")
+    raise ConvergenceError(
+        f"rod: {len(x)} elements leave an error of {error:.2g} mm: ask for a larger tolerance"
+    )

@@ -1,5 +1,5 @@
-"""Areas of a segment's cross-section, averaged over one pitch: the slanted chambers make every section different, so
-the areas of the twisting tube are the volumes of one cell divided by its pitch."""
+"""Areas of a segment's cross-section, averaged over one pitch: the slanted chambers make every section
+different, so the areas of the twisting tube are the volumes of one cell divided by its pitch."""
 
 import numpy as np
 
@@ -30,13 +30,17 @@ def equivalent_radii(segment):
 
 
 def active_mass(segment):
-    """(mass per undeformed length in tonne/mm, z of its centre in mm) of chambers and core, averaged over a pitch."""
+    """(mass per undeformed length in tonne/mm, z of its centre in mm) of chambers and core, averaged over a
+    pitch."""
     s = segment
     share = s.chamber_thickness / s.sin / s.pitch
     hollow = s.cavity_thickness / s.sin / s.pitch
     parts = _core(s)
     for side in s.sides:
-        blocks = [(share * s.width, s.core_top, s.chamber_top), (-hollow * s.cavity_width, s.cavity_floor, s.cavity_top)]
+        blocks = [
+            (share * s.width, s.core_top, s.chamber_top),
+            (-hollow * s.cavity_width, s.cavity_floor, s.cavity_top),
+        ]
         if s.cavity_floor < s.channel_height / 2:
             blocks.append((hollow * s.channel_width, s.cavity_floor, s.channel_height / 2))
         parts += [(w * s.material.density, *sorted((side * a, side * b))) for w, a, b in blocks]
@@ -50,7 +54,10 @@ def passive_mass(segment):
 
 def _core(s):
     density = s.material.density
-    parts = [(s.width * density, s.core_bottom, s.core_top), (-s.channel_width * density, -s.channel_height / 2, s.channel_height / 2)]
+    parts = [
+        (s.width * density, s.core_bottom, s.core_top),
+        (-s.channel_width * density, -s.channel_height / 2, s.channel_height / 2),
+    ]
     if s.layer_thickness:
         parts.append((s.width * (s.layer_material.density - density), s.core_bottom, s.layer_top))
     return parts

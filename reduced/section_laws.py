@@ -1,7 +1,9 @@
-"""Elastic laws of a rod's sections: the interface, the quadratic law about free states, and that of bare core.
+"""Elastic laws of a rod's sections: the interface, the quadratic law about free states, and that of bare
+core.
 
-A law is an enthalpy psi (N: energy per undeformed length, the gas's work included) of the section frame's strains q = (e1, e2, e3,
-k1, k2, k3), 1/mm for k, at a pressure P in MPa. Its minimiser is the free state, its gradient is (force, moment) in the section frame.
+A law is an enthalpy psi (N: energy per undeformed length, the gas's work included) of the section frame's
+strains q = (e1, e2, e3, k1, k2, k3), 1/mm for k, at a pressure P in MPa. Its minimiser is the free state, its
+gradient is (force, moment) in the section frame.
 """
 
 from dataclasses import dataclass
@@ -34,8 +36,9 @@ class RodLaw(Protocol):
 class QuadraticLaw:
     """psi = (q - q0)^T K (q - q0)/2 with q0 and K linear in the pressure between given states.
 
-    pressures (n,) in MPa, increasing; strains (n, 6); stiffnesses (n, 6, 6), symmetric and positive definite. One state serves at
-    any pressure, several within their range. A tangent at the free state: good for small departures from it.
+    pressures (n,) in MPa, increasing; strains (n, 6); stiffnesses (n, 6, 6), symmetric and positive definite.
+    One state serves at any pressure, several within their range. A tangent at the free state: good for small
+    departures from it.
     """
 
     pressures: np.ndarray
@@ -46,18 +49,27 @@ class QuadraticLaw:
         p, q, K = (np.asarray(a, float) for a in (self.pressures, self.strains, self.stiffnesses))
         n = p.size
         if p.ndim != 1 or not n or not (np.diff(p) > 0).all() or q.shape != (n, 6) or K.shape != (n, 6, 6):
-            raise InputError("pressures, strains, stiffnesses: give n increasing pressures, strains (n, 6) and stiffnesses (n, 6, 6)")
-        if not (np.isfinite(q).all() and np.isfinite(K).all()) or abs(K - np.swapaxes(K, 1, 2)).max() > 1e-6 * abs(K).max():
+            raise InputError(
+                "pressures, strains, stiffnesses: give n increasing pressures, strains (n, 6) and stiffnesses"
+                " (n, 6, 6)"
+            )
+        if (
+            not (np.isfinite(q).all() and np.isfinite(K).all())
+            or abs(K - np.swapaxes(K, 1, 2)).max() > 1e-6 * abs(K).max()
+        ):
             raise InputError("stiffnesses: must be finite and symmetric")
         if np.linalg.eigvalsh(K).min() <= 0:
-            raise InputError("stiffnesses: must be positive definite: a state at or beyond a limit point carries no rod")
+            raise InputError(
+                "stiffnesses: must be positive definite: a state at or beyond a limit point carries no rod"
+            )
         for name, value in (("pressures", p), ("strains", q), ("stiffnesses", K)):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_known", lru_cache(maxsize=64)(self._interpolated))
 
     @classmethod
     def of_states(cls, states):
-        """From equilibria of a free unit cell (hifi.cell_system.CellState: pressure, strains, stiffness), in order of pressure."""
+        """From equilibria of a free unit cell (hifi.cell_system.CellState: pressure, strains, stiffness), in
+        order of pressure."""
         return cls(
             [s.pressure for s in states],
             [np.concatenate([s.strains.e, s.strains.k]) for s in states],
@@ -99,10 +111,11 @@ class QuadraticLaw:
 
 
 def beam_stiffness(rectangles, torsion):
-    """(6, 6) stiffness in (e, k) about the x axis of a section of rectangles (half width, z0, z1, signed shear modulus), mm and MPa.
+    """(6, 6) stiffness in (e, k) about the x axis of a section of rectangles (half width, z0, z1, signed
+    shear modulus), mm and MPa.
 
-    Incompressible (E = 3 mu); plane sections; shear area 5/6 and the shear centre at the centre of stiffness. torsion: N mm2 about
-    that centre.
+    Incompressible (E = 3 mu); plane sections; shear area 5/6 and the shear centre at the centre of stiffness.
+    torsion: N mm2 about that centre.
     """
     w, z0, z1, mu = (np.asarray(a, float) for a in zip(*rectangles))
     area = 2 * w * (z1 - z0)
@@ -117,11 +130,12 @@ def beam_stiffness(rectangles, torsion):
 
 
 def passive_law(segment, curvature=0.0):
-    """The QuadraticLaw of a segment's bare core with its channel: ends, plugs and joints, which the pressure leaves unstrained;
-    curvature: free curvature about z, 1/mm, all the same (reduced.ends.end_turn).
+    """The QuadraticLaw of a segment's bare core with its channel: ends, plugs and joints, which the pressure
+    leaves unstrained; curvature: free curvature about z, 1/mm, all the same (reduced.ends.end_turn).
 
-    (Around a thin bore in an incompressible core, thrust on the cap and pressure on the wall cancel in the elongation.) Torsion is
-    that of the full rectangle (Timoshenko & Goodier, Theory of Elasticity, Sec. 109) less the channel's polar moment.
+    (Around a thin bore in an incompressible core, thrust on the cap and pressure on the wall cancel in the
+    elongation.) Torsion is that of the full rectangle (Timoshenko & Goodier, Theory of Elasticity, Sec. 109)
+    less the channel's polar moment.
     """
     s, mu = segment, segment.material.mu
     rectangles = [
@@ -135,6 +149,10 @@ def passive_law(segment, curvature=0.0):
     ratio = short / long
     torsion = long * short**3 * (1 / 3 - 0.21 * ratio * (1 - ratio**4 / 12))
     torsion -= s.channel_width * s.channel_height * (s.channel_width**2 + s.channel_height**2) / 12
-    mean = sum(2 * w * (b - a) * m for w, a, b, m in rectangles) / sum(2 * w * (b - a) * np.sign(m) for w, a, b, m in rectangles[:2])
+    mean = sum(2 * w * (b - a) * m for w, a, b, m in rectangles) / sum(
+        2 * w * (b - a) * np.sign(m) for w, a, b, m in rectangles[:2]
+    )
     rest = RodStrains.unstrained()
-    return QuadraticLaw([0.0], [[*rest.e, *rest.k[:2], curvature]], [beam_stiffness(rectangles, mean * torsion)])
+    return QuadraticLaw(
+        [0.0], [[*rest.e, *rest.k[:2], curvature]], [beam_stiffness(rectangles, mean * torsion)]
+    )

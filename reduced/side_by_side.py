@@ -38,5 +38,8 @@ def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, **setti
     likes = like.processes if like else [None] * len(widths)
     slopes = slopes or gaussian.no_slopes(x.shape[1], y.shape[1])
     parts = [slice(*both) for both in zip(ends, ends[1:])]
-    found = [gaussian.fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, **settings) for c, known in zip(parts, likes)]
+    found = [
+        gaussian.fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, **settings)
+        for c, known in zip(parts, likes)
+    ]
     return SideBySide(tuple(found))

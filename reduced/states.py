@@ -1,4 +1,5 @@
-"""The states of a data set that a law is trained on and judged by, and how designs are kept apart for the judging."""
+"""The states of a data set that a law is trained on and judged by, and how designs are kept apart for the
+judging."""
 
 from dataclasses import dataclass, fields
 
@@ -7,11 +8,13 @@ import numpy as np
 from base.dataset import full_matrices
 from reduced.law_coordinates import REST, Coordinates
 
-#: held-out designs that suffice to judge a law; with fewer the training designs are judged too, by laws that have not seen them
+#: held-out designs that suffice to judge a law; with fewer the training designs are judged too, by laws that
+#: have not seen them
 ENOUGH = 100
 #: parts that the training designs fall into for that
 PARTS = 10
-#: designs on a finer mesh that suffice to learn what it changes (measured: from two of them the law's guess was three times off)
+#: designs on a finer mesh that suffice to learn what it changes (measured: from two of them the law's guess
+#: was three times off)
 COMMON = 10
 #: of a pressure: nearer to that of a state, first touch is known to lie before it, not where
 NEAR = 1e-4
@@ -19,11 +22,12 @@ NEAR = 1e-4
 
 @dataclass(frozen=True)
 class States:
-    """Free states of one kind, rest included: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6, 6), design (n,) numbers,
-    level (n,) of the mesh, the finest last, size (n,): norm of the free strains, rest taken off, at the case's top pressure;
-    closing (n,): how far walls have come nearer, as if they could go on in the first state after touch, over the load
-    (Coordinates.closing_load) and the normal pitch; nan in the states beyond and at rest. touching (n,) bool.
-    strain_slopes (n, s, 6), matrix_slopes (n, s, 6, 6): derivatives along the `directions` (s, 13) of shape, nan where not known."""
+    """Free states of one kind, rest included: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6,
+    6), design (n,) numbers, level (n,) of the mesh, the finest last, size (n,): norm of the free strains,
+    rest taken off, at the case's top pressure; closing (n,): how far walls have come nearer, as if they could
+    go on in the first state after touch, over the load (Coordinates.closing_load) and the normal pitch; nan
+    in the states beyond and at rest. touching (n,) bool. strain_slopes (n, s, 6), matrix_slopes (n, s, 6, 6):
+    derivatives along the `directions` (s, 13) of shape, nan where not known."""
 
     kind: str
     shape: np.ndarray
@@ -40,7 +44,9 @@ class States:
     directions: np.ndarray
 
     def of(self, chosen):
-        return States(self.kind, *(getattr(self, f.name)[chosen] for f in fields(self)[1:-1]), self.directions)
+        return States(
+            self.kind, *(getattr(self, f.name)[chosen] for f in fields(self)[1:-1]), self.directions
+        )
 
     @property
     def loaded(self):
@@ -59,9 +65,9 @@ class States:
 
 @dataclass(frozen=True)
 class Sample:
-    """Cells of one kind: free States, and of those at prescribed strains the free state (`around`, States), the change (m, 6) of the
-    strains from there and the forces (m, 6). Designs with a number below `drawn` are the sample's, as held-out ones are; others were
-    chosen."""
+    """Cells of one kind: free States, and of those at prescribed strains the free state (`around`, States),
+    the change (m, 6) of the strains from there and the forces (m, 6). Designs with a number below `drawn` are
+    the sample's, as held-out ones are; others were chosen."""
 
     free: States
     around: States
@@ -82,7 +88,11 @@ class Sample:
     def on_common_meshes(self):
         """Those on the coarsest mesh and on others that at least COMMON designs are computed on."""
         free, held = self.free, self.around
-        rare = [level for level in np.unique(free.level) if level and len(np.unique(free.design[free.level == level])) < COMMON]
+        rare = [
+            level
+            for level in np.unique(free.level)
+            if level and len(np.unique(free.design[free.level == level])) < COMMON
+        ]
         kept = ~np.isin(held.level, rare)
         return self._with(free.of(~np.isin(free.level, rare)), kept)
 
@@ -112,11 +122,23 @@ def sample_of(data, kind, held_out):
     top = {}
     for i in free:  # pressures increase
         top[data.case[i]] = np.linalg.norm(data.strains[i] - REST)
-    closing = {i: rate for case in top for i, rate in _closing(data, free[data.case[free] == case], Coordinates(kind))}
+    closing = {
+        i: rate
+        for case in top
+        for i, rate in _closing(data, free[data.case[free] == case], Coordinates(kind))
+    }
     at = {(data.case[i], round(float(data.pressure[i]), 6)): n for n, i in enumerate(free)}
     states = States(
         kind,
-        *(a.astype(float) for a in (data.shape[data.case[free]], data.pressure[free], data.strains[free], data.matrices[free])),
+        *(
+            a.astype(float)
+            for a in (
+                data.shape[data.case[free]],
+                data.pressure[free],
+                data.strains[free],
+                data.matrices[free],
+            )
+        ),
         data.design[data.case[free]],
         level[data.mesh[data.case[free]]],
         np.array([top[data.case[i]] for i in free]),
@@ -139,7 +161,8 @@ def _met(first_touch):
 
 
 def _closing(data, rows, coordinates):
-    """Pairs (row, States.closing) of a case's free states, which have these rows, at rest first: those that say something."""
+    """Pairs (row, States.closing) of a case's free states, which have these rows, at rest first: those that
+    say something."""
     distance, pressure = (a[rows].astype(float) for a in (data.wall_distance, data.pressure))
     lead = coordinates.leading(data.strains[rows].astype(float))
     load, first = coordinates.closing_load(pressure, lead), _met(data.first_touch[data.case[rows[0]]])
@@ -161,10 +184,12 @@ def folds(designs, parts):
 
 
 def splits(training, held_out):
-    """[(what a law learns from, what it is judged on)] of two Samples: as they are, and where the held-out designs are too few
-    also by PARTS of those training designs that were drawn as they were."""
+    """[(what a law learns from, what it is judged on)] of two Samples: as they are, and where the held-out
+    designs are too few also by PARTS of those training designs that were drawn as they were."""
     pairs = [(training, held_out)]
     if len(held_out.designs) < ENOUGH:
         every, drawn = training.designs, training.designs[training.designs < training.drawn]
-        pairs += [(training.of(np.setdiff1d(every, judged)), training.of(judged)) for judged in folds(drawn, PARTS)]
+        pairs += [
+            (training.of(np.setdiff1d(every, judged)), training.of(judged)) for judged in folds(drawn, PARTS)
+        ]
     return pairs

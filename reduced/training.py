@@ -1,7 +1,9 @@
-"""`pneunet train`: the rod law from the data set of cells, and how well it does on designs that it has not seen.
+"""`pneunet train`: the rod law from the data set of cells, and how well it does on designs that it has not
+seen.
 
-Nothing of the held-out designs is used before the last table. Where they are few, laws trained on parts of the training designs are
-judged on the other ones too (reduced.states.splits); they find metric and noise anew.
+Nothing of the held-out designs is used before the last table. Where they are few, laws trained on parts of
+the training designs are judged on the other ones too (reduced.states.splits); they find metric and noise
+anew.
 """
 
 import hashlib
@@ -25,7 +27,8 @@ FURTHER_PARTS, FURTHER_BY = 5, 1.0
 
 
 def samples_of(data, say=lambda text: None):
-    """{kind: (training Sample, held-out Sample)} of the kinds of which there are enough; InputError where there is none."""
+    """{kind: (training Sample, held-out Sample)} of the kinds of which there are enough; InputError where
+    there is none."""
     out = {}
     for kind in data.about["kinds"]:
         pair = training, held_out = tuple(sample_of(data, kind, held) for held in (False, True))
@@ -50,10 +53,11 @@ def digest(path):
 
 
 def run_training(path, out, say=print, compare=True, mapping=map, like=None):
-    """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables. Returns the RodLaw.
+    """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables. Returns
+    the RodLaw.
 
-    mapping: a `map`, over processes for instance; what it computes side by side does not depend on how many there are. like: file of a
-    law whose metrics and noises are taken as they are.
+    mapping: a `map`, over processes for instance; what it computes side by side does not depend on how many
+    there are. like: file of a law whose metrics and noises are taken as they are.
     """
     data, started = read_dataset(path), time.perf_counter()
     known, about = (read_law(like).kinds, {"like_sha256": digest(like)}) if like else ({}, {})
@@ -67,7 +71,11 @@ def run_training(path, out, say=print, compare=True, mapping=map, like=None):
     done = list(_shown(mapping(_do, jobs), len(jobs), "trained", say))
     laws, tables = dict(zip(samples, done)), iter(done[len(samples) :])
     judged = judge(laws, samples, mapping, say)
-    lines, held_out, compared = [f"# The trained law of {Path(path).name}"], held_out_figures(laws, samples), {}
+    lines, held_out, compared = (
+        [f"# The trained law of {Path(path).name}"],
+        held_out_figures(laws, samples),
+        {},
+    )
     for kind, pair in samples.items():
         lines += ["", f"## {kind}", "", judged_on(*pair), "", "| figure | value |", "|---|---|"]
         lines += [f"| {name} | {value:.4f} |" for name, value in judged[kind].items()]
@@ -102,13 +110,15 @@ def _shown(results, count, what, say):
 
 
 def judge(laws, samples, mapping=map, say=lambda text: None):
-    """{kind: {figure: number}} of KindLaws on the designs that neither they nor, where those are few, laws of parts have seen; and of
-    the designs at further angles, as `designs_at_further_angles` gives them."""
+    """{kind: {figure: number}} of KindLaws on the designs that neither they nor, where those are few, laws of
+    parts have seen; and of the designs at further angles, as `designs_at_further_angles` gives them."""
     jobs = []
     for kind, law in laws.items():
         (_, held_out), *parts = splits(*samples[kind])
         jobs += [(misses, (law, held_out)), *[(judge_again, (law, *part)) for part in parts]]
-        jobs += [(judge_free_states_again, (law, *part)) for part in designs_at_further_angles(*samples[kind])]
+        jobs += [
+            (judge_free_states_again, (law, *part)) for part in designs_at_further_angles(*samples[kind])
+        ]
     done = iter(list(_shown(mapping(_do, jobs), len(jobs), "judged", say)))
     out = {}
     for kind, law in laws.items():
@@ -131,8 +141,8 @@ def judge_free_states_again(law, learned, judged):
 
 
 def designs_at_further_angles(training, held_out):
-    """[(what a law learns from, what it is judged on)]: the training designs that are clearly more slanted than any held-out one, as edge
-    designs may be, in parts; [] where they are few."""
+    """[(what a law learns from, what it is judged on)]: the training designs that are clearly more slanted
+    than any held-out one, as edge designs may be, in parts; [] where they are few."""
     slant, most = (np.abs(90 - sample.free.shape[:, 0]) for sample in (training, held_out))
     further = np.unique(training.free.design[slant > most.max() + FURTHER_BY])
     parts = folds(further, FURTHER_PARTS) if len(further) >= 2 * FURTHER_PARTS else []

@@ -15,8 +15,8 @@ import numpy as np
 from base.errors import InputError
 from reduced.equilibrium import follow
 
-#: Components of the fibre A(angle) on the axis Z and the hoop Psi. `axial`: the text below Eq. 3, angle measured from
-#: the axis, which is what a chamber does; `hoop`: Eqs 11-12, cos on the hoop direction.
+#: Components of the fibre A(angle) on the axis Z and the hoop Psi. `axial`: the text below Eq. 3, angle
+#: measured from the axis, which is what a chamber does; `hoop`: Eqs 11-12, cos on the hoop direction.
 FIBRE_CONVENTIONS = {"axial": (np.cos, np.sin), "hoop": (np.sin, np.cos)}
 
 #: The paper's constants for its twisting theory: Eq. 2, below Eq. 1, Sec. III.
@@ -27,7 +27,8 @@ GAUSS_POINTS = 12
 
 @dataclass(frozen=True)
 class TwistingTube:
-    """inner_radius, outer_radius: Ri, Ro in mm; mu, fibre_modulus: shear modulus and E_t in MPa; fractions c1, c2.
+    """inner_radius, outer_radius: Ri, Ro in mm; mu, fibre_modulus: shear modulus and E_t in MPa; fractions
+    c1, c2.
 
     fibre_convention: 'axial' (A = (cos, sin) on (Z, Psi)) or 'hoop' (A = (sin, cos)).
     """
@@ -42,15 +43,21 @@ class TwistingTube:
 
     def __post_init__(self):
         if not 0 < self.inner_radius < self.outer_radius:
-            raise InputError(f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius = {self.outer_radius:g} mm")
+            raise InputError(
+                f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius ="
+                f" {self.outer_radius:g} mm"
+            )
         for name in ("mu", "fibre_modulus", "isotropic_fraction", "anisotropic_fraction"):
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} = {getattr(self, name):g} must be larger than 0")
         if self.fibre_convention not in FIBRE_CONVENTIONS:
-            raise InputError(f"fibre_convention = '{self.fibre_convention}' is not known: write 'axial' or 'hoop'")
+            raise InputError(
+                f"fibre_convention = '{self.fibre_convention}' is not known: write 'axial' or 'hoop'"
+            )
 
     def solve(self, angle, pressure):
-        """(ri, lambda_z, tau): inner radius in mm, stretch, rad per mm of deformed length; each shaped as pressure.
+        """(ri, lambda_z, tau): inner radius in mm, stretch, rad per mm of deformed length; each shaped as
+        pressure.
 
         angle in degrees; pressure in MPa, a number or an array. ConvergenceError beyond the limit load.
         """
@@ -93,7 +100,8 @@ class TubePotential:
         )
 
     def energy(self, x):
-        """Value, gradient (3,) and Hessian (3, 3): by (rho = r^2, lambda, k) first, with rho of (a, lambda)."""
+        """Value, gradient (3,) and Hessian (3, 3): by (rho = r^2, lambda, k) first, with rho of (a,
+        lambda)."""
         t, R2 = self.tube, self.R**2
         Ri2, Ro = t.inner_radius**2, t.outer_radius
         a, lz, k = x[0], x[1], x[2] / Ro
@@ -121,7 +129,9 @@ class TubePotential:
         m = s + k * c
         I4 = rho * m * m + (lz * c) ** 2
         g4 = np.array([m * m, 2 * lz * c * c * one, 2 * rho * m * c])
-        h4 = np.array([[zero, zero, 2 * m * c], [zero, 2 * c * c * one, zero], [2 * m * c, zero, 2 * rho * c * c]])
+        h4 = np.array(
+            [[zero, zero, 2 * m * c], [zero, 2 * c * c * one, zero], [2 * m * c, zero, 2 * rho * c * c]]
+        )
         root = np.sqrt(I4)
         iso, fibre = t.isotropic_fraction * t.mu / 2, t.anisotropic_fraction * t.fibre_modulus / 2
         # W = iso (I1 - 3) + fibre (root - 1)^2; dW/dI4 = fibre (1 - 1/root), d2W/dI4^2 = fibre/(2 root^3)
@@ -130,6 +140,8 @@ class TubePotential:
         hq = iso * h1 + w4 * h4 + w44 * g4[:, None] * g4[None]
         value = self.weights @ (iso * (I1 - 3) + fibre * (root - 1) ** 2)
         gradient = np.einsum("ain,an,n->i", to_q, gq, self.weights)
-        hessian = np.einsum("ain,abn,bjn,n->ij", to_q, hq, to_q, self.weights) + dd_rho @ (gq[0] * self.weights)
+        hessian = np.einsum("ain,abn,bjn,n->ij", to_q, hq, to_q, self.weights) + dd_rho @ (
+            gq[0] * self.weights
+        )
         unit = np.array([1, 1, 1 / Ro])
         return value, gradient * unit, hessian * unit * unit[:, None]

@@ -1,4 +1,5 @@
-"""The reference cases that documents and issues name, as factories of their segments: angle in degrees, chambers.
+"""The reference cases that documents and issues name, as factories of their segments: angle in degrees,
+chambers.
 
 All dimensions in mm; "normal" thicknesses are across the chamber.
 """

@@ -1,4 +1,5 @@
-"""The same periodic body cut elsewhere: part of a cell's tetrahedra moved by one pitch, every one as it was."""
+"""The same periodic body cut elsewhere: part of a cell's tetrahedra moved by one pitch, every one as it
+was."""
 
 import gmsh
 import numpy as np
@@ -8,7 +9,8 @@ from geometry.cell import AIR
 
 
 def recut(path, other, pitch, beyond):
-    """Write to `other` the cell meshed at `path` with the tetrahedra whose centroid has x > `beyond` (mm) one pitch to the left.
+    """Write to `other` the cell meshed at `path` with the tetrahedra whose centroid has x > `beyond` (mm) one
+    pitch to the left.
 
     The new cut is the jagged surface that those tetrahedra leave.
     """
@@ -28,7 +30,10 @@ def recut(path, other, pitch, beyond):
             for opposite in range(4):
                 for key, s in zip(np.sort(np.delete(tets, opposite, axis=1), axis=1), shift):
                     shift_of_face[tuple(key)] = s
-    faces = {tag: np.array([2 * row + shift_of_face[tuple(np.sort(row))] for row in rows]) for tag, rows in faces.items()}
+    faces = {
+        tag: np.array([2 * row + shift_of_face[tuple(np.sort(row))] for row in rows])
+        for tag, rows in faces.items()
+    }
     used = np.unique(np.concatenate([tets.ravel() for tets in moved.values()]))
     points = X[used // 2] - np.outer(used % 2, [pitch, 0, 0])
     with cad.session("recut"):
@@ -46,4 +51,8 @@ def recut(path, other, pitch, beyond):
 def _elements(dim, tag, corners):
     kind = {3: 4, 2: 2}[dim]
     entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
-    return np.concatenate([gmsh.model.mesh.getElementsByType(kind, e)[1] for e in entities]).astype(int).reshape(-1, corners)
+    return (
+        np.concatenate([gmsh.model.mesh.getElementsByType(kind, e)[1] for e in entities])
+        .astype(int)
+        .reshape(-1, corners)
+    )

@@ -28,7 +28,10 @@ def numbers():
     for i, (e, k) in enumerate(zip(measured.strains.e, measured.strains.k), start=1):
         out |= {f"segment_{i}_e{j}": v for j, v in enumerate(e, start=1)}
         out |= {f"segment_{i}_k{j}_per_mm": v for j, v in enumerate(k, start=1)}
-    out |= {"smallest_wall_distance_mm": measured.touch.wall_distance, "body_distance_mm": measured.touch.body_distance}
+    out |= {
+        "smallest_wall_distance_mm": measured.touch.wall_distance,
+        "body_distance_mm": measured.touch.body_distance,
+    }
     solve.destroy()
     return out
 
@@ -36,13 +39,26 @@ def numbers():
 def on_ranks(ranks, path):
     """`numbers()` of a run on so many ranks, started as a user would; `path` is where it leaves them."""
     python = sys.executable
-    command = [python, "-m", "pneunet", "run", "-n", str(ranks), "--", python, "-m", "tests.reference_case", str(path)]
+    command = [
+        python,
+        "-m",
+        "pneunet",
+        "run",
+        "-n",
+        str(ranks),
+        "--",
+        python,
+        "-m",
+        "tests.reference_case",
+        str(path),
+    ]
     subprocess.run(command, check=True, cwd=DATA.parent.parent, timeout=300)
     return json.loads(Path(path).read_text())
 
 
 def largest_difference(one, two):
-    """Largest difference of two results, relative to the larger of a value and 1 (0.01 for curvatures, 1/mm)."""
+    """Largest difference of two results, relative to the larger of a value and 1 (0.01 for curvatures,
+    1/mm)."""
     scale = {name: 0.01 if "per_mm" in name else 1.0 for name in one}
     return max(abs(two[name] - value) / max(abs(value), scale[name]) for name, value in one.items())
 

@@ -18,12 +18,23 @@ from tests.cases import CASES
 
 STORED = Path(__file__).resolve().parent / "data" / "reference_outputs.json"
 #: (case, angle in degrees) of the free strains, and pressures in kPa
-STATES = (("one_sided_w10", 60.0), ("twist_w12", 60.0)), (2.0, 5.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0, 40.0, 50.0)
+STATES = (
+    (("one_sided_w10", 60.0), ("twist_w12", 60.0)),
+    (2.0, 5.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0, 40.0, 50.0),
+)
 _SOFT = NeoHookean(mu=0.2068)
 #: three designs and their pressures in kPa
 DESIGNS = {
-    "tentacle": (Manipulator((CASES["twist_w12"](60.0, 6), Segment("one-sided", 90.0, 6), Segment("one-sided", 60.0, 8))), 40.0),
-    "finger": (Manipulator((Segment("one-sided", 90.0, 10, width=10.0, channel_width=2.0, material=_SOFT),)), 30.0),
+    "tentacle": (
+        Manipulator(
+            (CASES["twist_w12"](60.0, 6), Segment("one-sided", 90.0, 6), Segment("one-sided", 60.0, 8))
+        ),
+        40.0,
+    ),
+    "finger": (
+        Manipulator((Segment("one-sided", 90.0, 10, width=10.0, channel_width=2.0, material=_SOFT),)),
+        30.0,
+    ),
     "coil": (Manipulator((CASES["one_sided_w10"](120.0, 12), CASES["one_sided_w10"](70.0, 5))), 25.0),
 }
 
@@ -34,7 +45,10 @@ def free_strains():
     out = {}
     for name, angle in cases:
         segment = CASES[name](angle, 5)
-        found = {law: choose_law(law).strains(segment, np.array(pressures) * 1e-3) for law in ("trained", "analytic")}
+        found = {
+            law: choose_law(law).strains(segment, np.array(pressures) * 1e-3)
+            for law in ("trained", "analytic")
+        }
         out[name] = {law: np.hstack([q.e, q.k]).tolist() for law, q in found.items()}
     return out
 
@@ -42,7 +56,9 @@ def free_strains():
 def centrelines():
     """{design: points (n, 3) in mm, every 5 mm or nearer}."""
     law = choose_law()
-    return {name: predict(body, 1e-3 * kPa, law, 5.0).points.tolist() for name, (body, kPa) in DESIGNS.items()}
+    return {
+        name: predict(body, 1e-3 * kPa, law, 5.0).points.tolist() for name, (body, kPa) in DESIGNS.items()
+    }
 
 
 def held_out_figures():
@@ -59,7 +75,9 @@ def cell():
     from hifi.cellfile import CellCase
 
     with tempfile.TemporaryDirectory() as folder:
-        state, _ = solve_cell(CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1), Path(folder) / "cell.msh")
+        state, _ = solve_cell(
+            CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1), Path(folder) / "cell.msh"
+        )
     strains = [*state.strains.e, *state.strains.k]
     return {"strains": strains, "volume_mm3": state.volume, "stiffness": state.stiffness.tolist()}
 
@@ -74,7 +92,11 @@ def body():
 
 def reduced_outputs():
     """What numpy and scipy alone compute."""
-    return {"free strains": free_strains(), "centrelines": centrelines(), "held-out figures": held_out_figures()}
+    return {
+        "free strains": free_strains(),
+        "centrelines": centrelines(),
+        "held-out figures": held_out_figures(),
+    }
 
 
 def finite_element_outputs():
@@ -93,4 +115,6 @@ def largest_difference(one, two):
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(json.dumps(reduced_outputs() | finite_element_outputs(), default=float) + "\n")
+    Path(sys.argv[1]).write_text(
+        json.dumps(reduced_outputs() | finite_element_outputs(), default=float) + "\n"
+    )

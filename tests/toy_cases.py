@@ -1,4 +1,5 @@
-"""Cases that end in every way there is, and a program that runs them: `python -m tests.toy_cases DIRECTORY WHICH [--retry]`."""
+"""Cases that end in every way there is, and a program that runs them: `python -m tests.toy_cases DIRECTORY
+WHICH [--retry]`."""
 
 import ctypes
 import json
@@ -87,9 +88,14 @@ def main(directory, which, *options):
 
     files = {"journal": f"{directory}.journal", "grandchild": f"{directory}.grandchild"}
     cases = {
-        "endings": [Case(f"tests.toy_cases:{name}", {"x": 3, **files}) for name in [*ENDINGS, "initialises_mpi", "square"]],
+        "endings": [
+            Case(f"tests.toy_cases:{name}", {"x": 3, **files})
+            for name in [*ENDINGS, "initialises_mpi", "square"]
+        ],
         "naps": [Case("tests.toy_cases:naps", {"x": x, **files}) for x in range(8)],
-        "failures": [Case(f"tests.toy_cases:{name}", {}) for name in ("ends_short", "refuses", "raises", "aborts")],
+        "failures": [
+            Case(f"tests.toy_cases:{name}", {}) for name in ("ends_short", "refuses", "raises", "aborts")
+        ],
         "none": [],
     }[which]
     records = run_cases(cases, directory, Limits(SECONDS, MEMORY_MB), retry="--retry" in options)

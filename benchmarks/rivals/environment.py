@@ -31,6 +31,11 @@ def python():
 
 
 def variables():
-    """Environment variables of a run there: its programs (NGSolve's compiler script) first on PATH, one thread."""
-    kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")}
+    """Environment variables of a run there: its programs (NGSolve's compiler script) first on PATH, one
+    thread."""
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
+    }
     return kept | ONE_THREAD | {"PATH": f"{VENV / 'bin'}{os.pathsep}{os.environ.get('PATH', os.defpath)}"}

@@ -1,8 +1,9 @@
-"""The ramp's body in FElupe, with MKL PARDISO through pypardiso: FElupe's regions, fields, solid body and pressure.
+"""The ramp's body in FElupe, with MKL PARDISO through pypardiso: FElupe's regions, fields, solid body and
+pressure.
 
-FElupe takes any quadrature rule, so it integrates with ours; what its library lacks (tetrahedra's faces as a boundary
-region, this energy) is added the way its documentation shows. Everything that does not change is made once: the
-pattern of the matrix, and where each block's entries go in its upper triangle.
+FElupe takes any quadrature rule, so it integrates with ours; what its library lacks (tetrahedra's faces as a
+boundary region, this energy) is added the way its documentation shows. Everything that does not change is
+made once: the pattern of the matrix, and where each block's entries go in its upper triangle.
 """
 
 import felupe as fem
@@ -15,8 +16,9 @@ from scipy.sparse import csr_matrix
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 ANALYSE, FACTORISE, SOLVE = 11, 22, 33  # PARDISO's phases
 SYMMETRIC_INDEFINITE = -2
-#: own settings, METIS, pivots perturbed at 1e-8, Bunch-Kaufman, two-level factorisation: the fastest of ten tried; the
-#: default spends two thirds of a solution on iterative refinement, which Newton's method does not need
+#: own settings, METIS, pivots perturbed at 1e-8, Bunch-Kaufman, two-level factorisation: the fastest of ten
+#: tried; the default spends two thirds of a solution on iterative refinement, which Newton's method does not
+#: need
 IPARM = {1: 1, 2: 2, 10: 8, 21: 1, 24: 1}
 
 
@@ -63,7 +65,8 @@ class TetraFaces(fem.Region):
 
 
 class Quadratic:
-    """Quadratic tetrahedra of linear ones: points (vertices, then mid-edge points) and the cells of any of its tets."""
+    """Quadratic tetrahedra of linear ones: points (vertices, then mid-edge points) and the cells of any of
+    its tets."""
 
     def __init__(self, points, tets):
         self.vertices = len(points)
@@ -88,7 +91,9 @@ class FElupeBody(Body):
         quadratic = Quadratic(points, tets)
         self.nodes = quadratic.points
         rule = fem.quadrature.Scheme(mesh["volume_points"], mesh["volume_weights"])
-        region = fem.Region(fem.Mesh(self.nodes, quadratic.cells(tets), "tetra10"), fem.QuadraticTetra(), rule)
+        region = fem.Region(
+            fem.Mesh(self.nodes, quadratic.cells(tets), "tetra10"), fem.QuadraticTetra(), rule
+        )
         region_p = fem.Region(fem.Mesh(points, tets, "tetra"), fem.Tetra(), rule)
         self.field = fem.FieldContainer([fem.Field(region, dim=3), fem.Field(region_p, dim=1)])
         self.solid = fem.SolidBody(Incompressible(MU), self.field, block=False)
@@ -118,7 +123,9 @@ class FElupeBody(Body):
         """[(matrix, first column)]: K_uu and K_up of the solid, and the pressure's K_uu."""
         self._set_fields()
         uu, up = self.solid.assemble.matrix(self.field)[:2]
-        load = self.pressure.assemble.matrix(self.field, pressure=self.pressure.assemble.multiplier * pressure)
+        load = self.pressure.assemble.matrix(
+            self.field, pressure=self.pressure.assemble.multiplier * pressure
+        )
         return [(uu, 0), (up, self.count_u), (load, 0)]
 
     def _prepare_matrix(self):
@@ -141,7 +148,9 @@ class FElupeBody(Body):
         pattern = np.unique(np.concatenate([*keys, diagonal]))
         self._places = [(c, np.searchsorted(pattern, k)) for c, k in zip(chosen, keys)]
         indptr = np.concatenate([[0], np.cumsum(np.bincount(pattern // n, minlength=n))])
-        self.matrix = csr_matrix((np.zeros(len(pattern)), (pattern % n).astype(np.int32), indptr.astype(np.int32)), shape=(n, n))
+        self.matrix = csr_matrix(
+            (np.zeros(len(pattern)), (pattern % n).astype(np.int32), indptr.astype(np.int32)), shape=(n, n)
+        )
         self.solver = PyPardisoSolver(mtype=SYMMETRIC_INDEFINITE)
         for i, value in IPARM.items():
             self.solver.set_iparm(i, value)

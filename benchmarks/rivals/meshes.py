@@ -1,4 +1,5 @@
-"""The meshes of the speed benches, as each code wants them: gmsh's file for ours, plain arrays for the others."""
+"""The meshes of the speed benches, as each code wants them: gmsh's file for ours, plain arrays for the
+others."""
 
 import json
 from pathlib import Path
@@ -19,9 +20,9 @@ def segment():
 def make(directory, mesh_size, manipulator=None):
     """Folder with manipulator.msh, mesh.json and mesh.npz for this mesh size (mm); made once.
 
-    mesh.npz: points (n, 3) in mm, tets (m, 4), base, cavity and channel (k, 4) tets whose first three vertices are a
-    facet of that surface, all of positive volume, and the rules with which ours integrates: volume_points (q, 3),
-    volume_weights, facet_points (q, 2), facet_weights on the unit simplices.
+    mesh.npz: points (n, 3) in mm, tets (m, 4), base, cavity and channel (k, 4) tets whose first three
+    vertices are a facet of that surface, all of positive volume, and the rules with which ours integrates:
+    volume_points (q, 3), volume_weights, facet_points (q, 2), facet_weights on the unit simplices.
     """
     from geometry.mesh import mesh_manipulator, segment_tables
 
@@ -29,7 +30,9 @@ def make(directory, mesh_size, manipulator=None):
     facts = directory / "mesh.json"
     if facts.exists() and (directory / "mesh.npz").exists():
         known = json.loads(facts.read_text())
-        if known["mesh_size_mm"] == mesh_size and known["segments"] == json.loads(json.dumps(segment_tables(manipulator))):
+        if known["mesh_size_mm"] == mesh_size and known["segments"] == json.loads(
+            json.dumps(segment_tables(manipulator))
+        ):
             return directory
     mesh_manipulator(manipulator, mesh_size, directory)
     with atomic_path(directory / "mesh.npz") as temporary:
@@ -54,7 +57,9 @@ def arrays(path):
         found = {"points": points.reshape(-1, 3)[order], "tets": tets}
         for name, tag in (("base", cad.BASE), ("cavity", cad.CAVITY), ("channel", cad.CHANNEL)):
             entities = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
-            facets = np.concatenate([gmsh.model.mesh.getElementsByType(2, e)[1].reshape(-1, 3) for e in entities])
+            facets = np.concatenate(
+                [gmsh.model.mesh.getElementsByType(2, e)[1].reshape(-1, 3) for e in entities]
+            )
             found[name] = owners(tets, np.searchsorted(tags[order], facets))
     finally:
         gmsh.finalize()
@@ -64,7 +69,9 @@ def arrays(path):
 
 def owners(tets, facets):
     """Tets (k, 4) that own the facets (k, 3), in an even permutation that brings the facet to the front."""
-    fronts = np.concatenate([tets[:, even] for even in ([0, 1, 2, 3], [1, 0, 3, 2], [0, 2, 3, 1], [2, 1, 3, 0])])
+    fronts = np.concatenate(
+        [tets[:, even] for even in ([0, 1, 2, 3], [1, 0, 3, 2], [0, 2, 3, 1], [2, 1, 3, 0])]
+    )
 
     def keys(corners):
         return np.sort(corners, axis=1) @ np.array([2**42, 2**21, 1])
@@ -82,4 +89,9 @@ def rules():
 
     volume = make_quadrature(CellType.tetrahedron, VOLUME_DEGREE)
     facet = make_quadrature(CellType.triangle, PRESSURE_DEGREE)
-    return {"volume_points": volume[0], "volume_weights": volume[1], "facet_points": facet[0], "facet_weights": facet[1]}
+    return {
+        "volume_points": volume[0],
+        "volume_weights": volume[1],
+        "facet_points": facet[0],
+        "facet_weights": facet[1],
+    }

@@ -1,7 +1,9 @@
-"""The ramp's body in NGSolve: an energy, compiled to C++, whose derivatives NGSolve takes itself; MKL PARDISO.
+"""The ramp's body in NGSolve: an energy, compiled to C++, whose derivatives NGSolve takes itself; MKL
+PARDISO.
 
-The follower pressure is the energy -P V with V = -1/3 int x . cof(F) N over the cavity's wall (N out of the body), whose
-second variation is symmetric since the cavity is closed. NGSolve integrates with its own rules of order 4.
+The follower pressure is the energy -P V with V = -1/3 int x . cof(F) N over the cavity's wall (N out of the
+body), whose second variation is symmetric since the cavity is closed. NGSolve integrates with its own rules
+of order 4.
 """
 
 import netgen.meshing as netgen
@@ -9,7 +11,8 @@ import ngsolve as ng
 import numpy as np
 from ramp import MU, Body
 
-#: METIS, no iterative refinement, two-level factorisation: faster than NGSolve's own choice and its sparsecholesky
+#: METIS, no iterative refinement, two-level factorisation: faster than NGSolve's own choice and its
+#: sparsecholesky
 PARDISO = {"ordering": "metis", "refinement": 0, "iparm23": 1}
 ORDER = 4
 
@@ -102,6 +105,9 @@ class NGSolveBody(Body):
             return x.FV().NumPy().copy()
 
     def displacements(self):
-        """(points (n, 3), displacements (n, 3)) at vertices, in mm (the basis is hierarchical: others are no nodes)."""
+        """(points (n, 3), displacements (n, 3)) at vertices, in mm (the basis is hierarchical: others are no
+        nodes)."""
         u = self.unknown.components[0]
-        return self.points, np.column_stack([u.components[i].vec.FV().NumPy()[: len(self.points)] for i in range(3)])
+        return self.points, np.column_stack(
+            [u.components[i].vec.FV().NumPy()[: len(self.points)] for i in range(3)]
+        )

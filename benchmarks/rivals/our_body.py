@@ -18,12 +18,15 @@ from hifi.solver import DirectSolver
 
 
 class OurBody(Body):
-    """Plain displacement updates, no section frames, no secants: what the strategies of `ramp` say and no more."""
+    """Plain displacement updates, no section frames, no secants: what the strategies of `ramp` say and no
+    more."""
 
     def __init__(self, path, comm=MPI.COMM_WORLD):
         super().__init__()
         self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
-        self.problem = MixedProblem(*compat.read_mesh(path, comm), NeoHookean(MU), [Support(cad.BASE)], [self.pressure])
+        self.problem = MixedProblem(
+            *compat.read_mesh(path, comm), NeoHookean(MU), [Support(cad.BASE)], [self.pressure]
+        )
         self.dofs, self.speaks = self.problem.dofs, comm.rank == 0
         self.matrix = self.problem.create_tangent()
         self.solver = DirectSolver(self.matrix, comm)
@@ -78,7 +81,9 @@ class BestBody:
 
     def ramp(self, tolerance):
         self.newton.options.relative_tolerance = tolerance
-        result = self.solve.run(MILESTONES[-1] * MPA, milestones=[load * MPA for load in MILESTONES], stability=False)
+        result = self.solve.run(
+            MILESTONES[-1] * MPA, milestones=[load * MPA for load in MILESTONES], stability=False
+        )
         return [(step.load / MPA, step.iterations, step.factorisations) for step in result.steps]
 
     @property

@@ -1,11 +1,11 @@
 """What is compared: the load ramp and its strategies, written once for all codes. Needs numpy alone.
 
-A code is a `Body`: arrays in, arrays out, whatever it keeps behind them. The strategies are
-"same": the steps 2.5, 5, 10 .. 50 kPa, quadratic Lagrange extrapolation of the state in the load, and a Jacobian that is
-factorised again only when an iteration has lowered the residual by less than 3.3 times (the first with the tangent at
-u = 0 and P = 0: with pressure but without membrane stress it is useless);
-"stock": Newton's method from the last state, a factorisation an iteration, no predictor; in steps of 2.5 kPa, the largest
-with which it arrives (5 kPa fail from the second step on; halving on failure costs 40 % more).
+A code is a `Body`: arrays in, arrays out, whatever it keeps behind them. The strategies are "same": the steps
+2.5, 5, 10 .. 50 kPa, quadratic Lagrange extrapolation of the state in the load, and a Jacobian that is
+factorised again only when an iteration has lowered the residual by less than 3.3 times (the first with the
+tangent at u = 0 and P = 0: with pressure but without membrane stress it is useless); "stock": Newton's method
+from the last state, a factorisation an iteration, no predictor; in steps of 2.5 kPa, the largest with which
+it arrives (5 kPa fail from the second step on; halving on failure costs 40 % more).
 """
 
 import time
@@ -26,9 +26,10 @@ MAXIMUM_ITERATIONS = 40
 class Body:
     """One code's discrete body. Arrays are over all its dofs, in whatever order it likes.
 
-    state: (dofs,) displacements in mm and multipliers in MPa, zero where supported. forces() -> (internal force, load per
-    unit of pressure) at the state; factorise(pressure) assembles and factorises the tangent there; solve(right) ->
-    K^-1 right; fixed: indices of supported dofs; dofs: how many; displacements() -> points and displacements (n, 3) in mm.
+    state: (dofs,) displacements in mm and multipliers in MPa, zero where supported. forces() -> (internal
+    force, load per unit of pressure) at the state; factorise(pressure) assembles and factorises the tangent
+    there; solve(right) -> K^-1 right; fixed: indices of supported dofs; dofs: how many; displacements() ->
+    points and displacements (n, 3) in mm.
     """
 
     speaks = True
@@ -49,7 +50,8 @@ class Body:
         self.seconds[name] += time.perf_counter() - start
 
     def balance(self, pressure):
-        """(residual, zero at supports; its norm; the norm of what it balances: pressure load or support reaction)."""
+        """(residual, zero at supports; its norm; the norm of what it balances: pressure load or support
+        reaction)."""
         with self.timed("residual"):
             internal, load = self.forces()
             reaction = np.linalg.norm(internal[self.fixed])
@@ -73,7 +75,9 @@ class Body:
             residual, norm, scale = self.balance(pressure)
             if not norm < 1e8 * scale:
                 break
-        raise RuntimeError(f"{pressure / MPA:g} kPa: no convergence, residual {norm:.1e} N after {iteration + 1} iterations")
+        raise RuntimeError(
+            f"{pressure / MPA:g} kPa: no convergence, residual {norm:.1e} N after {iteration + 1} iterations"
+        )
 
 
 def extrapolate(known, load):
@@ -127,7 +131,8 @@ def summary(body, steps):
 
 
 def operations(body, tolerance, repeats=5):
-    """Least seconds of each operation, the second and later factorisations (same pattern); "analyse": what the first adds."""
+    """Least seconds of each operation, the second and later factorisations (same pattern); "analyse": what
+    the first adds."""
     pressure = SAME_LOADS[0] * MPA
     body.factorise(0.0)
     first, taken = body.seconds["factorise"], []

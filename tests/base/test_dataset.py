@@ -11,7 +11,8 @@ from base.errors import InputError
 
 @pytest.fixture
 def data():
-    """Three cases: P V of a linear spring, one that bends to a forbidden side, one that was ended; all with four free states."""
+    """Three cases: P V of a linear spring, one that bends to a forbidden side, one that was ended; all with
+    four free states."""
     P = np.array([0.0, 0.1, 0.2, 0.3])
     about = {
         "kinds": ["one-sided", "twisting"],
@@ -26,7 +27,10 @@ def data():
     }
     n, m = 3, 8
     sizes = {"cases": n, "states": m}
-    arrays = {f.name: np.zeros((sizes[f.metadata["of"]], *f.metadata["shape"]), f.metadata["type"]) for f in columns()}
+    arrays = {
+        f.name: np.zeros((sizes[f.metadata["of"]], *f.metadata["shape"]), f.metadata["type"])
+        for f in columns()
+    }
     arrays["status"][2] = 1
     arrays["case"][:] = np.repeat([0, 1], 4)
     arrays["pressure"][:] = np.tile(P, 2)
@@ -48,7 +52,9 @@ def test_a_file_gives_back_what_was_written(tmp_path, data):
     again = read_dataset(tmp_path / "cells.npz")
     assert again.strain_slopes == pytest.approx(slopes, rel=1.3e-4, abs=0, nan_ok=True)
     write_dataset(tmp_path / "again.npz", again)
-    assert np.array_equal(read_dataset(tmp_path / "again.npz").strain_slopes, again.strain_slopes, equal_nan=True)
+    assert np.array_equal(
+        read_dataset(tmp_path / "again.npz").strain_slopes, again.strain_slopes, equal_nan=True
+    )
     for f in columns():
         if f.name != "strain_slopes":
             assert (getattr(again, f.name) == getattr(data, f.name)).all()
@@ -79,7 +85,9 @@ def test_the_data_sheet_names_what_was_not_accepted(data):
 def test_another_schema_and_another_file_are_refused(tmp_path, data):
     path = tmp_path / "cells.npz"
     np.savez(path, about=np.frombuffer(json.dumps({"schema": "other"}).encode(), np.uint8))
-    with pytest.raises(InputError, match="cells.npz: schema 'other' is not [^:]*: make it again with pneunet campaign$"):
+    with pytest.raises(
+        InputError, match="cells.npz: schema 'other' is not [^:]*: make it again with pneunet campaign$"
+    ):
         read_dataset(path)
     path.write_text("no archive")
     with pytest.raises(InputError, match="not a data set"):

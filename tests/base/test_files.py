@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from base.errors import InputError
-from base.files import atomic_path, output_directory, read_columns, read_csv, require_writable, write_csv, write_text
+from base.files import (
+    atomic_path,
+    output_directory,
+    read_columns,
+    read_csv,
+    require_writable,
+    write_csv,
+    write_text,
+)
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -34,7 +42,9 @@ def test_csv_reads_back_to_twelve_digits(tmp_path):
     write_csv(path, ["step", "x_mm", "name"], [[1, np.float64(1 / 3), "one, two"], [2, 1e-20, "three"]])
     header, rows = read_csv(path)
     assert header == ["step", "x_mm", "name"] and rows[0] == ["1", "0.333333333333", "one, two"]
-    assert read_columns(path, ["x_mm", "step"]) == pytest.approx(np.array([[1 / 3, 1], [1e-20, 2]]), rel=1e-12)
+    assert read_columns(path, ["x_mm", "step"]) == pytest.approx(
+        np.array([[1 / 3, 1], [1e-20, 2]]), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(

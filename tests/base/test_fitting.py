@@ -20,16 +20,27 @@ def measured(material, largest=3.0, noise=0.0, points=150):
 
 @pytest.mark.parametrize(
     "material",
-    [NeoHookean(0.2), MooneyRivlin(0.08, 0.05), Yeoh(0.06, -4e-4, 9e-5), Gent(0.15, 25.0), Ogden(0.1, 3.2), Ogden(0.2, 1.5, 0.003, 6.0)],
+    [
+        NeoHookean(0.2),
+        MooneyRivlin(0.08, 0.05),
+        Yeoh(0.06, -4e-4, 9e-5),
+        Gent(0.15, 25.0),
+        Ogden(0.1, 3.2),
+        Ogden(0.2, 1.5, 0.003, 6.0),
+    ],
     ids=lambda m: m.law,
 )
 def test_parameters_come_back_through_noise(material):
-    exact, noisy = (fit(material.law, TensileData([measured(material, noise=n)])).material for n in (0.0, 0.01))
+    exact, noisy = (
+        fit(material.law, TensileData([measured(material, noise=n)])).material for n in (0.0, 0.01)
+    )
     own = [getattr(material, name) for name in material.parameters]
     assert [getattr(exact, name) for name in material.parameters] == pytest.approx(own, rel=2e-3, abs=1e-6)
     assert noisy.mu == pytest.approx(material.mu, rel=0.03)
     l = np.linspace(1.1, 3, 20)
-    assert nominal_stress(noisy, "uniaxial", l) == pytest.approx(nominal_stress(material, "uniaxial", l), rel=0.02)
+    assert nominal_stress(noisy, "uniaxial", l) == pytest.approx(
+        nominal_stress(material, "uniaxial", l), rel=0.02
+    )
 
 
 def warnings(law, *specimens, **options):
@@ -42,7 +53,9 @@ def test_doubtful_fits_say_so():
     told = warnings("neo-Hookean", stiffening)
     assert "does not have the curve's shape" in told and "too stiff" in told
     assert "reaches only 15 % strain" in warnings("neo-Hookean", measured(NeoHookean(0.2), 1.15))
-    assert "reaches only 14 % strain" in warnings("neo-Hookean", measured(NeoHookean(0.2)), largest_strain=0.15)
+    assert "reaches only 14 % strain" in warnings(
+        "neo-Hookean", measured(NeoHookean(0.2)), largest_strain=0.15
+    )
     assert "c01 came out at its bound 0" in warnings("Mooney-Rivlin", measured(NeoHookean(0.2)))
     assert "jm came out at its bound" in warnings("Gent", measured(NeoHookean(0.2)))
     assert "unlikely in equibiaxial" in warnings("Mooney-Rivlin", measured(MooneyRivlin(0.001, 0.2)))
@@ -64,9 +77,10 @@ POINTS = [(0.1, 0.02), (0.2, 0.04), (0.4, 0.07), (0.6, 0.09), (0.8, 0.12), (1.0,
     [
         "stretch,nominal_stress_MPa\n" + "".join(f"{1 + e},{s}\n" for e, s in POINTS),
         "strain_percent,stress_kPa\n" + "".join(f"{100 * e},{1e3 * s}\n" for e, s in POINTS),
-        "a;b\nMaterial;x\n\nTime (s);True Strain;True Stress (MPa);Engineering Strain;Engineering Stress (MPa)\n"
-        + "".join(f"{i};9;9;{e};{s}\n".replace(".", ",") for i, (e, s) in enumerate(POINTS)),
-        "Strain (%)\tStress (N/mm2)\n" + "".join(f"{100 * e}\t{s}\n" for e, s in [*POINTS, (1.02, 0.03), (1.5, 0.0)]),
+        "a;b\nMaterial;x\n\nTime (s);True Strain;True Stress (MPa);Engineering Strain;Engineering Stress"
+        " (MPa)\n" + "".join(f"{i};9;9;{e};{s}\n".replace(".", ",") for i, (e, s) in enumerate(POINTS)),
+        "Strain (%)\tStress (N/mm2)\n"
+        + "".join(f"{100 * e}\t{s}\n" for e, s in [*POINTS, (1.02, 0.03), (1.5, 0.0)]),
     ],
     ids=["stretch", "percent and kPa", "columns of a testing machine", "breaks"],
 )
@@ -92,7 +106,10 @@ def test_specimens_beside_and_below_each_other(tmp_path):
         ("x,y\n1,2\n", "no header with a strain .* and a stress column"),
         ("strain,stress\n0.1,1\n", "'stress' names no unit of stress: .*--stress-unit MPa"),
         ("strain,stress_MPa\n0.1,one\n", "'one' is not a number"),
-        ("strain,stress_MPa\n" + "".join(f"{100 * e},{s}\n" for e, s in POINTS), "reaches 100: if these are percent"),
+        (
+            "strain,stress_MPa\n" + "".join(f"{100 * e},{s}\n" for e, s in POINTS),
+            "reaches 100: if these are percent",
+        ),
         ("strain,stress_MPa\n0.1,1\n0.2,2\n", "fewer than 5 points"),
     ],
 )
@@ -116,5 +133,7 @@ def test_all_laws_are_compared_and_the_best_can_be_pasted(tmp_path):
     assert material_from_table(table, "file") == chosen.material
     assert chosen.material.break_stretch == pytest.approx(4.0) and chosen.material.name == "my test"
     told = "\n".join(said)
-    assert all(law in told for law in LAWS) and "uniaxial data alone" in told and "no fall of the stress" in told
+    assert (
+        all(law in told for law in LAWS) and "uniaxial data alone" in told and "no fall of the stress" in told
+    )
     assert (tmp_path / "fit" / "fit.png").read_bytes().startswith(b"\x89PNG")

@@ -20,7 +20,11 @@ def test_left_jacobian_and_its_slope_by_differences(turn):
     J, slope = LeftJacobian(twist[None]), np.empty((6, 6))
     np.testing.assert_allclose(J.pose[0], se3.exp_pose(twist), atol=1e-12)
     for i, d in enumerate(step * np.eye(6)):
-        moved = (se3.exp_pose(twist + d) - se3.exp_pose(twist - d)) / (2 * step) @ se3.inverse_pose(se3.exp_pose(twist))
+        moved = (
+            (se3.exp_pose(twist + d) - se3.exp_pose(twist - d))
+            / (2 * step)
+            @ se3.inverse_pose(se3.exp_pose(twist))
+        )
         np.testing.assert_allclose(J.matrix[0, :, i], twist_of(moved), atol=2e-9)
         ahead, behind = (LeftJacobian((twist + s * d)[None]).matrix[0].T @ wrench for s in (1, -1))
         slope[:, i] = (ahead - behind) / (2 * step)
@@ -33,4 +37,6 @@ def test_commutator_and_adjoint_are_those_of_the_matrices():
     np.testing.assert_allclose(commutator(x)[0] @ y[0], twist_of(X @ Y - Y @ X), atol=1e-14)
     np.testing.assert_allclose(commutator(x)[0].T @ w[0], wrench_commutator(w)[0] @ x[0], atol=1e-14)
     pose = se3.exp_pose(x[0])
-    np.testing.assert_allclose(adjoint(pose[None])[0] @ y[0], twist_of(pose @ Y @ se3.inverse_pose(pose)), atol=1e-14)
+    np.testing.assert_allclose(
+        adjoint(pose[None])[0] @ y[0], twist_of(pose @ Y @ se3.inverse_pose(pose)), atol=1e-14
+    )

@@ -9,7 +9,16 @@ import pytest
 
 from base.errors import InputError
 from base.hyperelastic import MODES, nominal_stress, shear_stress, stable_stretch
-from base.materials import Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh, material_from_table, material_to_table, silicone
+from base.materials import (
+    Gent,
+    MooneyRivlin,
+    NeoHookean,
+    Ogden,
+    Yeoh,
+    material_from_table,
+    material_to_table,
+    silicone,
+)
 from base.silicones import BULLETINS
 
 LAWS = [
@@ -36,7 +45,9 @@ def test_what_is_not_known_is_infinite_and_what_is_incompressible_has_no_complia
     plain, known, compressible = LAWS[4], LAWS[0], LAWS[1]
     assert (plain.break_stretch, plain.bulk_compliance) == (inf, 0.0)
     assert known.break_stretch == 5.0 and material_to_table(known)["elongation_at_break_percent"] == 400.0
-    assert compressible.bulk_compliance == 0.02 and material_to_table(compressible)["bulk_modulus_MPa"] == 50.0
+    assert (
+        compressible.bulk_compliance == 0.02 and material_to_table(compressible)["bulk_modulus_MPa"] == 50.0
+    )
 
 
 @pytest.mark.parametrize("material", LAWS, ids=by_law)
@@ -58,7 +69,12 @@ UNIAXIAL, EQUIBIAXIAL, SHEAR = 2 - 1 / 4, 2 - 1 / 32, 2 - 1 / 8
         (NeoHookean(0.4), (0.4 * UNIAXIAL, 0.4 * EQUIBIAXIAL, 0.4 * SHEAR, 0.4 * 1.5)),
         (
             MooneyRivlin(0.2, 0.1),
-            (2 * UNIAXIAL * (0.2 + 0.1 / 2), 2 * EQUIBIAXIAL * (0.2 + 0.1 * 4), 2 * SHEAR * 0.3, 2 * 1.5 * 0.3),
+            (
+                2 * UNIAXIAL * (0.2 + 0.1 / 2),
+                2 * EQUIBIAXIAL * (0.2 + 0.1 * 4),
+                2 * SHEAR * 0.3,
+                2 * 1.5 * 0.3,
+            ),
         ),
         (
             Yeoh(0.2, 0.01, 0.001),
@@ -69,10 +85,23 @@ UNIAXIAL, EQUIBIAXIAL, SHEAR = 2 - 1 / 4, 2 - 1 / 32, 2 - 1 / 8
         ),
         (
             Gent(0.4, 10.0),
-            (0.4 * UNIAXIAL / 0.8, 0.4 * EQUIBIAXIAL / (1 - 81 / 160), 0.4 * SHEAR / 0.775, 0.4 * 1.5 / 0.775),
+            (
+                0.4 * UNIAXIAL / 0.8,
+                0.4 * EQUIBIAXIAL / (1 - 81 / 160),
+                0.4 * SHEAR / 0.775,
+                0.4 * 1.5 / 0.775,
+            ),
         ),
         # alpha = 4: slopes mu/2 l^4
-        (Ogden(0.4, 4.0), (0.2 * (16 - 1 / 4) / 2, 0.2 * (16 - 1 / 256) / 2, 0.2 * (16 - 1 / 16) / 2, 0.2 * (16 - 1 / 16) / 2.5)),
+        (
+            Ogden(0.4, 4.0),
+            (
+                0.2 * (16 - 1 / 4) / 2,
+                0.2 * (16 - 1 / 256) / 2,
+                0.2 * (16 - 1 / 16) / 2,
+                0.2 * (16 - 1 / 16) / 2.5,
+            ),
+        ),
     ],
     ids=lambda x: getattr(x, "law", None),
 )
@@ -84,8 +113,8 @@ def test_responses_at_stretch_2(material, expected):
 def test_stability():
     for material in LAWS:
         assert [stable_stretch(material, mode) for mode in MODES] == [inf] * 3
-    # simple case by hand: Mooney-Rivlin with c01 < 0 loses its stiffness in the free plane of equibiaxial stretch; see the sign
-    # of c10 + c01 l^2 that multiplies the only stiffness against in-plane shear
+    # simple case by hand: Mooney-Rivlin with c01 < 0 loses its stiffness in the free plane of equibiaxial
+    # stretch; see the sign of c10 + c01 l^2 that multiplies the only stiffness against in-plane shear
     falling = MooneyRivlin(0.3, -0.03)
     assert stable_stretch(falling, "equibiaxial") < np.sqrt(10) + 0.02
     assert stable_stretch(Gent(0.3, 5.0), "uniaxial") == inf
@@ -101,7 +130,10 @@ def test_stability():
         (lambda: Ogden(0.3, 2.0, 0.1, 14.0), "alpha2 = 14 must lie in"),
         (lambda: Ogden(0.3, 2.0, -0.4, 3.0), "mu1_MPa .* = -0.1 must be larger than 0"),
         (lambda: NeoHookean(0.3, bulk_modulus=1.0), "bulk_modulus_MPa = 1 is less than 5 shear moduli"),
-        (lambda: NeoHookean(0.3, elongation_at_break=-1.0), "elongation_at_break_percent = -100 must be larger than 0"),
+        (
+            lambda: NeoHookean(0.3, elongation_at_break=-1.0),
+            "elongation_at_break_percent = -100 must be larger than 0",
+        ),
     ],
 )
 def test_parameters_that_cannot_be_are_refused(build, message):
@@ -140,7 +172,10 @@ def test_silicones_of_the_table():
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"silicone": "Ecoflex"}, "file: silicone = 'Ecoflex' is not in the table: known are Ecoflex 00-10, "),
+        (
+            {"silicone": "Ecoflex"},
+            "file: silicone = 'Ecoflex' is not in the table: known are Ecoflex 00-10, ",
+        ),
         ({"silicone": ["Ecoflex 00-30"]}, "file: silicone = "),
         ({"silicone": "Ecoflex 00-30", "law": "Yeoh"}, "file: 'silicone' and 'law' exclude each other"),
         ({"law": "Gent", "mu_MPa": 0.3}, "file: key 'jm' is missing"),
@@ -158,5 +193,7 @@ def test_the_table_in_the_docs_is_the_code_s():
     rows = re.findall(r"^\| ([^|]+) \| (\d+) \| ([\d.]+) \| (\d+) \| (\d+) \|$", text, re.M)
     wanted = []
     for name, (stress, elongation, density) in BULLETINS.items():
-        wanted.append((name, str(stress), f"{silicone(name).mu:.4g}", str(elongation), str(round(1000 * density))))
+        wanted.append(
+            (name, str(stress), f"{silicone(name).mu:.4g}", str(elongation), str(round(1000 * density)))
+        )
     assert rows == wanted

@@ -1,4 +1,5 @@
-"""Rotations and rigid motions: against scipy's matrix exponential, and inverse of each other at every angle."""
+"""Rotations and rigid motions: against scipy's matrix exponential, and inverse of each other at every
+angle."""
 
 import numpy as np
 import pytest
@@ -50,7 +51,9 @@ def test_leading_dimensions_are_kept():
     assert poses.shape == (2, 3, 4, 4)
     assert poses[1, 2] == pytest.approx(se3.exp_pose(twists[1, 2]))
     assert se3.log_pose(poses) == pytest.approx(twists)
-    assert se3.hat(twists[..., :3]) @ twists[0, 0, 3:] == pytest.approx(np.cross(twists[..., :3], twists[0, 0, 3:]))
+    assert se3.hat(twists[..., :3]) @ twists[0, 0, 3:] == pytest.approx(
+        np.cross(twists[..., :3], twists[0, 0, 3:])
+    )
 
 
 def test_inverse_and_transform():

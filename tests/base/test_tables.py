@@ -55,7 +55,13 @@ def test_what_has_no_toml_form_is_refused():
 def test_dataclass_reads_back_in_internal_units():
     tube = from_table(Tube, {"radius_mm": 2, "pressure_kPa": 35.0, "angle_deg": 60}, "file", law="preset")
     assert tube == Tube(radius=2.0, pressure=0.035, angle=60.0, law="preset")
-    assert to_table(tube) == {"radius_mm": 2.0, "pressure_kPa": 35.0, "fibres": 4, "label": "a tube", "angle_deg": 60.0}
+    assert to_table(tube) == {
+        "radius_mm": 2.0,
+        "pressure_kPa": 35.0,
+        "fibres": 4,
+        "label": "a tube",
+        "angle_deg": 60.0,
+    }
     assert from_table(Tube, to_table(tube), "file", law="preset") == tube
 
 
@@ -65,7 +71,10 @@ def test_dataclass_reads_back_in_internal_units():
         ({"radius_cm": 2, "angle_deg": 1}, "file: key 'radius_cm' has the wrong unit: write 'radius_mm'"),
         ({"radius": 2, "angle_deg": 1}, "file: key 'radius' has the wrong unit: write 'radius_mm'"),
         ({"radios_mm": 2, "angle_deg": 1}, "file: unknown key 'radios_mm': did you mean 'radius_mm'?"),
-        ({"zzz": 2, "angle_deg": 1}, "file: unknown key 'zzz': known keys: angle_deg, fibres, label, pressure_kPa"),
+        (
+            {"zzz": 2, "angle_deg": 1},
+            "file: unknown key 'zzz': known keys: angle_deg, fibres, label, pressure_kPa",
+        ),
         ({"law": 2, "angle_deg": 1}, "file: unknown key 'law'"),
         ({}, "file: key 'angle_deg' is missing (of the fibres)"),
         ({"angle_deg": "60"}, "file: 'angle_deg' must be a finite number, not '60'"),
@@ -89,7 +98,12 @@ def test_known_keys_pass():
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(None, "no such file"), (b"a = ", "not valid TOML"), (b"\xff\xfe", "not valid TOML"), ("folder", "is a folder")],
+    [
+        (None, "no such file"),
+        (b"a = ", "not valid TOML"),
+        (b"\xff\xfe", "not valid TOML"),
+        ("folder", "is a folder"),
+    ],
 )
 def test_unreadable_files_are_named(tmp_path, content, message):
     path = tmp_path / "file.toml"
@@ -116,7 +130,10 @@ def test_material_reads_back_with_its_law():
         ({"mu_MPa": 317e3}, "file: mu_MPa = 317000 is outside .* is it in kPa"),
         ({"mu_MPa": 0.3, "density_kg_per_m3": -1}, "file: density_kg_per_m3 = -1 "),
         ({"mu_kPa": 317}, "file: key 'mu_kPa' has the wrong unit: write 'mu_MPa'"),
-        ({"mu_MPa": 0.3, "law": "Fung"}, "file: unknown law 'Fung': known laws are neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden"),
+        (
+            {"mu_MPa": 0.3, "law": "Fung"},
+            "file: unknown law 'Fung': known laws are neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden",
+        ),
         ({}, "file: key 'mu_MPa' is missing"),
     ],
 )

@@ -1,5 +1,5 @@
-"""A run directory as the commands leave it, small and consistent: the "finite elements" are the reduced model with
-every strain (departure from rest) times `FACTOR`, so the report's numbers can be foreseen."""
+"""A run directory as the commands leave it, small and consistent: the "finite elements" are the reduced model
+with every strain (departure from rest) times `FACTOR`, so the report's numbers can be foreseen."""
 
 import json
 
@@ -26,9 +26,18 @@ class Scaled(AnalyticModel):
         return RodStrains(rest.e + FACTOR * (s.e - rest.e), FACTOR * s.k)
 
 
-def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1.0, overlap=0.0, contact=False, solve=True, fields=True):
-    """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap` mm there, with `contact`
-    as a contact model's penetration."""
+def make_run(
+    directory,
+    segments=(TWIST, PLANE, HELIX),
+    pressure=0.02,
+    reached=1.0,
+    overlap=0.0,
+    contact=False,
+    solve=True,
+    fields=True,
+):
+    """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap`
+    mm there, with `contact` as a contact model's penetration."""
     manipulator, model = Manipulator(segments), AnalyticModel()
     design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
     directory.mkdir(parents=True, exist_ok=True)
@@ -36,13 +45,17 @@ def make_run(directory, segments=(TWIST, PLANE, HELIX), pressure=0.02, reached=1
     line = predict(manipulator, pressure, model, base_pose=POSE)
     wave = np.column_stack([np.zeros_like(line.s), np.zeros_like(line.s), 1.5 * (1 - np.cos(line.s / 20.0))])
     write_csv(directory / "target.csv", ["x_mm", "y_mm", "z_mm"], line.points + wave)
-    write_csv(directory / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"], np.column_stack([line.s, line.points]))
+    write_csv(
+        directory / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"], np.column_stack([line.s, line.points])
+    )
     record = {"command": "pneunet design target.csv", "revision": "abc", "inputs": {"law": "analytic"}}
     (directory / "run.json").write_text(json.dumps(record))
     if not solve:
         return design
     (directory / "mesh").mkdir(exist_ok=True)
-    (directory / "mesh" / "mesh.json").write_text(json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}}))
+    (directory / "mesh" / "mesh.json").write_text(
+        json.dumps({"cells": 1000, "mesh_size_mm": 2.0, "volumes": {"body_mm3": 1234.5}})
+    )
     _solve(directory / "solve", design, Scaled(), reached, overlap, contact, fields)
     return design
 
@@ -52,9 +65,14 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
     manipulator = design.manipulator
     steps, centrelines, segments = [], [], []
     for n, p in enumerate(design.pressure * reached * np.linspace(0, 1, 5)):
-        line, each = predict(manipulator, p, model, spacing=3.0), [model.strains(s, p) for s in manipulator.segments]
+        line, each = (
+            predict(manipulator, p, model, spacing=3.0),
+            [model.strains(s, p) for s in manipulator.segments],
+        )
         work = (4, 2) if n else (0, 0)
-        steps.append([n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 1 + 5 * p, 1.5 * n])
+        steps.append(
+            [n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 1 + 5 * p, 1.5 * n]
+        )
         centrelines += [[n, p * 1e3, s, *point] for s, point in zip(line.s, line.points)]
         segments += [[n, p * 1e3, i + 1, *one.e, *one.k] for i, one in enumerate(each)]
     walls = [
@@ -86,7 +104,9 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
         ],
         steps,
     )
-    write_csv(folder / "centrelines.csv", ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"], centrelines)
+    write_csv(
+        folder / "centrelines.csv", ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"], centrelines
+    )
     write_csv(
         folder / "segments.csv",
         ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"],
@@ -118,7 +138,9 @@ def _fields(folder, manipulator, line):
 
     s0 = manipulator.segments[0]
     x = np.linspace(0, manipulator.length, 60)
-    grid = pyvista.RectilinearGrid(x, np.linspace(-s0.width / 2, s0.width / 2, 5), np.linspace(-2, 4, 4)).cast_to_unstructured_grid()
+    grid = pyvista.RectilinearGrid(
+        x, np.linspace(-s0.width / 2, s0.width / 2, 5), np.linspace(-2, 4, 4)
+    ).cast_to_unstructured_grid()
     rest = np.asarray(grid.points, float)
     poses = line.at(np.clip(rest[:, 0], 0, line.s[-1]))
     local = rest * [0, 1, 1]

@@ -41,7 +41,9 @@ def test_a_bare_csv_becomes_a_folder_that_reads_back(helix, tmp_path):
     errors = compare(line[:, 1:], target)
     assert errors.rms < 0.4  # 0.5 % of length; the split and the round numbers of the drawing cost something
     written = again.result["target_error"]
-    assert written["rms_mm"] == pytest.approx(errors.rms, rel=1e-6) and written["eq27_sum_mm2"] == pytest.approx(errors.eq27, rel=1e-6)
+    assert written["rms_mm"] == pytest.approx(errors.rms, rel=1e-6) and written[
+        "eq27_sum_mm2"
+    ] == pytest.approx(errors.eq27, rel=1e-6)
     assert {"hausdorff_mm", "tip_mm", "length_mismatch_mm"} <= set(written)
     assert "simple automatic split" in again.result["split"] and again.result["piece"][0]["kind"] == "helical"
     assert json.loads((out / "run.json").read_text())["inputs"]["law"] == "toy"

@@ -56,9 +56,13 @@ def test_octopus_by_fitting_alone():
     assert twisting.twist == pytest.approx(0.01 * np.pi, rel=1e-3) and twisting.twist_seen
     assert bending.curvature == pytest.approx(0.018, rel=1e-3)
     curvature, torsion = helix_frenet(0.07, 90)
-    assert helical.curvature == pytest.approx(curvature, rel=1e-3) and helical.twist == pytest.approx(torsion, rel=1e-3)
+    assert helical.curvature == pytest.approx(curvature, rel=1e-3) and helical.twist == pytest.approx(
+        torsion, rel=1e-3
+    )
     table = helical.table()
-    assert table["cylinder_curvature_per_m"] == pytest.approx(70, rel=1e-3) and table["pitch_mm"] == pytest.approx(90, rel=1e-3)
+    assert table["cylinder_curvature_per_m"] == pytest.approx(70, rel=1e-3) and table[
+        "pitch_mm"
+    ] == pytest.approx(90, rel=1e-3)
 
 
 @pytest.mark.parametrize("turn", [0.5, -2.5, 3.6])

@@ -24,10 +24,13 @@ MIRROR = np.array([1.0, -1.0, 1.0])
 
 
 def made(segments, pressure=0.04, pose=None):
-    """(centreline, pieces) of a known manipulator; the pieces have the right kinds and deformed lengths only."""
+    """(centreline, pieces) of a known manipulator; the pieces have the right kinds and deformed lengths
+    only."""
     line = predict(Manipulator(segments), pressure, ToyLaw(), 0.5, pose)
     ends = np.interp(np.append(Manipulator(segments).starts, line.s[-1]), line.s, line.arc_length)
-    kinds = ["twisting" if s.kind == "twisting" else "bending" if s.angle == 90 else "helical" for s in segments]
+    kinds = [
+        "twisting" if s.kind == "twisting" else "bending" if s.angle == 90 else "helical" for s in segments
+    ]
     return line, tuple(Piece(kind, length) for kind, length in zip(kinds, np.diff(ends)))
 
 
@@ -57,14 +60,20 @@ def test_the_base_turns_to_a_target_anywhere_in_space():
     line, pieces = made((BENDING, HELICAL), pose=pose)
     solution, errors, _ = designed(Target(line.points, pieces=pieces))
     assert errors.rms < 0.1
-    assert np.allclose(solution.base_pose[:3, 3], pose[:3, 3]) and np.allclose(solution.base_pose, pose, atol=0.05)
+    assert np.allclose(solution.base_pose[:3, 3], pose[:3, 3]) and np.allclose(
+        solution.base_pose, pose, atol=0.05
+    )
 
 
 def test_a_fixed_direction_leaves_the_roll_free():
     pose = se3.exp_pose(np.array([1.0, 0, 0, 0, 0, 0]))
     line, pieces = made((BENDING, HELICAL), pose=pose)
     solution, errors, _ = designed(Target(line.points, pieces=pieces, base_direction=BASE["base_direction"]))
-    assert errors.rms < 0.1 and np.allclose(solution.base_pose[:3, 0], [1, 0, 0]) and np.allclose(solution.base_pose, pose, atol=0.05)
+    assert (
+        errors.rms < 0.1
+        and np.allclose(solution.base_pose[:3, 0], [1, 0, 0])
+        and np.allclose(solution.base_pose, pose, atol=0.05)
+    )
 
 
 def test_mirrored_target_gives_the_mirrored_design():
@@ -106,7 +115,9 @@ def test_a_range_grows_when_the_optimum_sits_on_its_bound():
 
 def test_bounds_that_may_not_grow_are_named():
     line, pieces = made((replace(BENDING, chambers=8),), pressure=0.05)
-    target = Target(line.points, pieces=pieces, pressure_range=(0.01, 0.02), vary={"chamber_height": (3.0, 4.0)})
+    target = Target(
+        line.points, pieces=pieces, pressure_range=(0.01, 0.02), vary={"chamber_height": (3.0, 4.0)}
+    )
     solution, errors, _ = designed(target)
     assert solution.pressure == pytest.approx(0.02, rel=1e-2) and errors.rms > 0.5
     assert "pressure = 20 kPa (upper bound)" in solution.active
@@ -133,7 +144,12 @@ def test_a_law_that_ends_at_a_limit_load_is_kept_within():
 def test_what_cannot_be_built_is_said():
     line, pieces = made((BENDING, HELICAL))
     with pytest.raises(InputError, match=r"\[\[piece\]\] 1: length_mm = 4 is too short"):
-        designed(Target(line.points, pieces=(Piece("bending", 4.0), Piece("helical", sum(p.length for p in pieces) - 4))))
+        designed(
+            Target(
+                line.points,
+                pieces=(Piece("bending", 4.0), Piece("helical", sum(p.length for p in pieces) - 4)),
+            )
+        )
     with pytest.raises(InputError, match=r"\[segment\].*side_wall_mm"):
         designed(Target(line.points, pieces=pieces, start={"side_wall": 6.0}))
     with pytest.raises(InputError, match=r"\[vary\].*angle_deg = 10"):

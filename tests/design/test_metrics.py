@@ -16,7 +16,11 @@ def circle(radius, n=4001):
 
 def test_parallel_lines_differ_by_their_offset_in_every_way():
     errors = compare(line(100, 3.0), line(100, n=30))
-    assert errors.rms == pytest.approx(3) and errors.hausdorff == pytest.approx(3) and errors.tip == pytest.approx(3)
+    assert (
+        errors.rms == pytest.approx(3)
+        and errors.hausdorff == pytest.approx(3)
+        and errors.tip == pytest.approx(3)
+    )
     assert errors.eq27 == pytest.approx(30 * 9) and errors.eq27_points == 30
     assert errors.length_mismatch == pytest.approx(0, abs=1e-12)
 

@@ -75,7 +75,9 @@ def test_drawing_keeps_every_text_on_the_sheet_and_apart(segments):
     texts = [t for ax in figure.axes for t in ax.texts if t.get_text()] + figure.texts
     boxes = [t.get_window_extent(renderer) for t in texts]
     for text, box in zip(texts, boxes):
-        assert sheet.x0 <= box.x0 and box.x1 <= sheet.x1 and sheet.y0 <= box.y0 and box.y1 <= sheet.y1, text.get_text()
+        assert sheet.x0 <= box.x0 and box.x1 <= sheet.x1 and sheet.y0 <= box.y0 and box.y1 <= sheet.y1, (
+            text.get_text()
+        )
     for i, a in enumerate(boxes):
         for j in range(i):
             width = min(a.x1, boxes[j].x1) - max(a.x0, boxes[j].x0)
@@ -90,7 +92,9 @@ def test_view_holds_all_points_and_is_orthonormal():
     points = np.random.default_rng(1).normal(size=(50, 3)) * [80, 20, 10]
     view = view_of(points)
     towards = np.cross(view.right, view.up)
-    assert np.column_stack([view.right, view.up, towards]).T @ np.column_stack([view.right, view.up, towards]) == pytest.approx(np.eye(3))
+    assert np.column_stack([view.right, view.up, towards]).T @ np.column_stack(
+        [view.right, view.up, towards]
+    ) == pytest.approx(np.eye(3))
     assert np.abs((points - view.focus) @ view.up).max() < view.half_height
     assert np.abs((points - view.focus) @ view.right).max() < view.half_height * PIXELS[0] / PIXELS[1]
 
@@ -100,7 +104,15 @@ def test_rendered_scale_is_the_views_scale():
     from base.rendering import render, view_of
 
     view = view_of(np.array([[-30.0, 0, 0], [30, 0, 0], [0, 20, 20]]))
-    image = render(view, [(pyvista.Sphere(radius=10.0, center=view.focus), {"color": "black", "ambient": 1.0, "diffuse": 0.0})])
+    image = render(
+        view,
+        [
+            (
+                pyvista.Sphere(radius=10.0, center=view.focus),
+                {"color": "black", "ambient": 1.0, "diffuse": 0.0},
+            )
+        ],
+    )
     rows = np.flatnonzero((image < 128).all(axis=2).any(axis=1))
     assert np.ptp(rows) * view.millimetres_per_pixel == pytest.approx(20.0, rel=0.02)
 
@@ -123,7 +135,9 @@ def test_shape_files(tmp_path):
     folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, lambda text: None, AnalyticModel())
     rows = read_columns(folder / "centrelines.csv", ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"])
     at_design = rows[rows[:, 0] == 20.0][:, 1:]
-    assert at_design == pytest.approx(read_columns(tmp_path / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"]))
+    assert at_design == pytest.approx(
+        read_columns(tmp_path / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"])
+    )
     assert rows[rows[:, 0] == 10.0][0, 2:] == pytest.approx(POSE[:3, 3])
     assert {p.name for p in folder.iterdir()} == {
         "centrelines.csv", "body_10kPa.vtp", "body_20kPa.vtp", "bodies.png", "inflation.gif", "run.json",

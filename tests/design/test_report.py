@@ -70,8 +70,12 @@ def test_verdict_tells_agreement_contradiction_and_overlap(tmp_path):
     assert "confirms the reduced prediction" in verdict(*judged(tmp_path / "a"))
     make_run(tmp_path / "b", (HELIX, HELIX), pressure=0.04, fields=False, overlap=0.2)
     run, c = judged(tmp_path / "b")
-    assert "is no test of the reduced prediction" in verdict(run, c) and verdict(run, c).startswith("NOT PROVEN")
-    assert overlaps(run) == ["Walls overlap from 36.00 kPa on, by up to 0.20 mm at the end; contact is not part of this solution"]
+    assert "is no test of the reduced prediction" in verdict(run, c) and verdict(run, c).startswith(
+        "NOT PROVEN"
+    )
+    assert overlaps(run) == [
+        "Walls overlap from 36.00 kPa on, by up to 0.20 mm at the end; contact is not part of this solution"
+    ]
     make_run(tmp_path / "d", (HELIX, HELIX), pressure=0.04, fields=False, overlap=0.01, contact=True)
     run, c = judged(tmp_path / "d")
     assert overlaps(run) == [] and "contradicts the reduced prediction" in verdict(run, c)
@@ -101,9 +105,18 @@ def test_report_page_is_whole_and_self_contained(tmp_path):
     page = write_report(tmp_path, say=lambda text: None).read_text()
     names = {p.name for p in (tmp_path / "report").iterdir()}
     assert names == {
-        "curves.png", "drawing.png", "fe.png", "fe_displacement.png", "fe_stretch.png", "fe_walls.png", "history.png", "reduced.png",
-        "reference.png", "target.png", "walls.png",
-    }  # fmt: skip
+        "curves.png",
+        "drawing.png",
+        "fe.png",
+        "fe_displacement.png",
+        "fe_stretch.png",
+        "fe_walls.png",
+        "history.png",
+        "reduced.png",
+        "reference.png",
+        "target.png",
+        "walls.png",
+    }
     assert page.count("data:image/png;base64,") == len(names)
     assert not re.search(r"(src|href)=\"(?!data:)", page) and str(tmp_path) not in page
     assert "WALLS OVERLAP in 1 of" in page and page.count("OVERLAP, not proven: Walls overlap from") == 3

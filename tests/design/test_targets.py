@@ -37,7 +37,9 @@ def test_bare_columns_and_named_ones_say_the_same(tmp_path):
 
 
 def test_frames_by_columns(tmp_path):
-    text = "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(f"{9 * i},0,0,1,0,0,0,0,1\n" for i in range(5))
+    text = "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(
+        f"{9 * i},0,0,1,0,0,0,0,1\n" for i in range(5)
+    )
     frames = read_target(csv(tmp_path, text)).frames
     assert np.allclose(frames[2], [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
 
@@ -65,7 +67,9 @@ def test_toml_with_inline_points_frames_and_everything(tmp_path):
     assert np.allclose(target.base_rotation, [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
     assert target.start == {"width": 14.0} and target.vary == {"chamber_height": (3, 6), "angle": (50, 90)}
     piece = target.pieces[0]
-    assert piece.twist == pytest.approx(0.0349998, abs=1e-6) and piece.curvature == pytest.approx(0.0349064, abs=1e-6)
+    assert piece.twist == pytest.approx(0.0349998, abs=1e-6) and piece.curvature == pytest.approx(
+        0.0349064, abs=1e-6
+    )
 
 
 def test_shipped_target_by_name_with_own_keys(tmp_path):
@@ -88,13 +92,18 @@ def test_shipped_target_by_name_with_own_keys(tmp_path):
         ("x_m,y_m,z_m\n0,0,0\n", "key 'x_m' has the wrong unit: write 'x_mm'"),
         ("x_mm,y_mm\n0,0\n", "column 'z_mm' is missing"),
         ("0,0,0\n.01,0,0\n.02,0,0\n.03,0,0\n", "are its coordinates in mm?"),
-        ("x_mm,y_mm,z_mm,t1x,t1y,t1z\n" + "".join(f"{9 * i},0,0,1,0,0\n" for i in range(5)), "column 't2x' is missing"),
         (
-            "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(f"{9 * i},0,0,1,0,0,1,0,0\n" for i in range(5)),
+            "x_mm,y_mm,z_mm,t1x,t1y,t1z\n" + "".join(f"{9 * i},0,0,1,0,0\n" for i in range(5)),
+            "column 't2x' is missing",
+        ),
+        (
+            "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n"
+            + "".join(f"{9 * i},0,0,1,0,0,1,0,0\n" for i in range(5)),
             "orthogonal",
         ),
         (
-            "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(f"{9 * i},0,0,0,1,0,1,0,0\n" for i in range(5)),
+            "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n"
+            + "".join(f"{9 * i},0,0,0,1,0,1,0,0\n" for i in range(5)),
             "t1 does not point",
         ),
     ],
@@ -133,7 +142,10 @@ PIECE = '[[piece]]\nkind = "{}"\nlength_mm = 50\n{}'
             'points = "curve.csv"\n' + PIECE.format("bending", "").replace("50", "70"),
             "add up to 70 mm but the curve is 50 mm",
         ),
-        ('points = "curve.csv"\n' + PIECE.format("bending", "curvature_per_mm = 1"), "write 'curvature_per_m'"),
+        (
+            'points = "curve.csv"\n' + PIECE.format("bending", "curvature_per_mm = 1"),
+            "write 'curvature_per_m'",
+        ),
         ('points = "curve.csv"\n' + PIECE.format("bending", "curvature_per_m = -1"), "must be larger than 0"),
         ('points = "curve.csv"\n' + PIECE.format("twisting", "tau_rad_per_m = 1"), "write 'tau_rad_per_mm'"),
         ('points = "curve.csv"\n' + PIECE.format("helical", "pitch_mm = 1"), "a helix is given by"),

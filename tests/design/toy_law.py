@@ -23,4 +23,6 @@ class ToyLaw(SegmentLaw):
             return RodStrains([1 + 0.1 * load, 0, 0], [k1, 0, 0])
         k = 0.04 * load * segment.chamber_height / 4 * (2 / segment.base_thickness) ** 0.5
         lean = -0.01 * load * np.cos(angle)
-        return RodStrains([1 + 0.04 * load, lean, 0], [k * np.sin(angle) * np.cos(angle), k * np.sin(angle) ** 2, 0])
+        return RodStrains(
+            [1 + 0.04 * load, lean, 0], [k * np.sin(angle) * np.cos(angle), k * np.sin(angle) ** 2, 0]
+        )

@@ -1,9 +1,10 @@
 """CAD volumes against closed forms derived here.
 
-A plan parallelogram of normal thickness t between y = -b/2 and b/2 has area t b / sin(angle), wherever it is cut by
-planes of constant y. So, per side of the core and chamber: outer block above the core t_c W / sin; cavity t b / sin
-times its height; what it shares with the channel, t w / sin times the height from its floor to the channel's top. The
-channel runs one pitch per chamber, and through the joints from one segment's last cell to the next one's first.
+A plan parallelogram of normal thickness t between y = -b/2 and b/2 has area t b / sin(angle), wherever it is
+cut by planes of constant y. So, per side of the core and chamber: outer block above the core t_c W / sin;
+cavity t b / sin times its height; what it shares with the channel, t w / sin times the height from its floor
+to the channel's top. The channel runs one pitch per chamber, and through the joints from one segment's last
+cell to the next one's first.
 """
 
 from dataclasses import replace
@@ -16,7 +17,10 @@ from base.materials import NeoHookean
 from geometry import Manipulator, Segment, cad
 from tests.cases import CASES
 
-ONE_SIDED, TWISTING = Segment("one-sided", 60.0, 3), Segment("twisting", 60.0, 3, cavity_floor=0.5, chamber_height=5.5)
+ONE_SIDED, TWISTING = (
+    Segment("one-sided", 60.0, 3),
+    Segment("twisting", 60.0, 3, cavity_floor=0.5, chamber_height=5.5),
+)
 
 
 def built(*segments):
@@ -36,7 +40,9 @@ def cavity_volume(s):
     channel = s.chambers * s.pitch * s.channel_width * s.channel_height
     plan = s.cavity_thickness / s.sin  # per unit of width
     shared = plan * s.channel_width * (s.channel_height / 2 - s.cavity_floor)
-    return channel + len(s.sides) * s.chambers * (plan * (s.width - 2 * s.side_wall) * s.chamber_height - shared)
+    return channel + len(s.sides) * s.chambers * (
+        plan * (s.width - 2 * s.side_wall) * s.chamber_height - shared
+    )
 
 
 def joint_volume(s):
@@ -61,12 +67,29 @@ def test_volumes_of_one_segment(kind, angle, floor):
         replace(ONE_SIDED, chambers=1),
         replace(TWISTING, chambers=1, angle=120.0),
         replace(ONE_SIDED, channel_width=10.0, gap=8.0, end_margin=3.0),
-        replace(ONE_SIDED, width=20.0, side_wall=2.0, roof=0.4, base_thickness=1.1, top_wall=1.7, wall=0.6, gap=3.1),
+        replace(
+            ONE_SIDED,
+            width=20.0,
+            side_wall=2.0,
+            roof=0.4,
+            base_thickness=1.1,
+            top_wall=1.7,
+            wall=0.6,
+            gap=3.1,
+        ),
     ],
-    ids=["floor on the channel's", "one chamber", "one pair", "channel as wide as the cavity", "all walls different"],
+    ids=[
+        "floor on the channel's",
+        "one chamber",
+        "one pair",
+        "channel as wide as the cavity",
+        "all walls different",
+    ],
 )
 def test_volumes_at_the_limits(segment):
-    assert built(segment) == pytest.approx((outer_volume(segment) - cavity_volume(segment), cavity_volume(segment)))
+    assert built(segment) == pytest.approx(
+        (outer_volume(segment) - cavity_volume(segment), cavity_volume(segment))
+    )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -76,7 +99,9 @@ def test_volumes_of_the_reference_cases(name):
 
 
 def test_a_manipulator_is_the_sum_of_its_segments_and_the_channel_through_the_joints():
-    other = replace(ONE_SIDED, angle=110.0, chambers=2, channel_width=3.0, channel_height=1.6, cavity_floor=0.8)
+    other = replace(
+        ONE_SIDED, angle=110.0, chambers=2, channel_width=3.0, channel_height=1.6, cavity_floor=0.8
+    )
     segments = (TWISTING, ONE_SIDED, other)
     body, cavity = built(*segments)
     joints = joint_volume(TWISTING) + 2 * joint_volume(ONE_SIDED) + joint_volume(other)

@@ -16,8 +16,20 @@ DESIGN = Design(
         (
             Segment("twisting", 61.23456789, 3, cavity_floor=0.5, gap=2.0, material=MATERIAL),
             Segment("one-sided", 90.0, 4, end_margin=1.5, material=MATERIAL),
-            Segment("one-sided", 120.0, 1, material=Gent(mu=0.5, jm=30.0, bulk_modulus=900.0, elongation_at_break=4.0)),
-            Segment("one-sided", 60.0, 1, layer_thickness=0.3, material=MATERIAL, layer_material=NeoHookean(mu=50.0, name="paper")),
+            Segment(
+                "one-sided",
+                120.0,
+                1,
+                material=Gent(mu=0.5, jm=30.0, bulk_modulus=900.0, elongation_at_break=4.0),
+            ),
+            Segment(
+                "one-sided",
+                60.0,
+                1,
+                layer_thickness=0.3,
+                material=MATERIAL,
+                layer_material=NeoHookean(mu=50.0, name="paper"),
+            ),
         )
     ),
     0.0364,
@@ -74,7 +86,9 @@ def test_a_layer_takes_its_own_material_or_the_common_one(tmp_path):
     layer = "\nlayer_thickness_mm = 0.5\n"
     own = "[segment.layer_material]\nmu_MPa = 70\n"
     segment = MINIMAL[MINIMAL.index("[[segment]]") :].rstrip()
-    path.write_text(f"{MINIMAL.rstrip()}{layer}{segment}{layer}{own}{segment}\n[layer_material]\nmu_MPa = 50\n")
+    path.write_text(
+        f"{MINIMAL.rstrip()}{layer}{segment}{layer}{own}{segment}\n[layer_material]\nmu_MPa = 50\n"
+    )
     segments = read_design(path).manipulator.segments
     assert [s.layer_material and s.layer_material.mu for s in segments] == [50.0, 70.0, None]
     assert [s.layer_thickness for s in segments] == [0.5, 0.5, 0.0]
@@ -83,32 +97,68 @@ def test_a_layer_takes_its_own_material_or_the_common_one(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("pressure_kPa = 20", "pressure_MPa = 0.02", "key 'pressure_MPa' has the wrong unit: write 'pressure_kPa'"),
+        (
+            "pressure_kPa = 20",
+            "pressure_MPa = 0.02",
+            "key 'pressure_MPa' has the wrong unit: write 'pressure_kPa'",
+        ),
         ("pressure_kPa = 20", "", "key 'pressure_kPa' is missing"),
         ("pressure_kPa = 20", "pressure_kPa = 0", "pressure_kPa = 0 leaves nothing to solve"),
         ("pressure_kPa = 20", "pressure_kPa = 20\nmesh_size_mm = 0.01", "mesh_size_mm = 0.01 must lie in"),
-        ("pressure_kPa = 20", 'schema = "other"\npressure_kPa = 20', "schema = 'other' is not 'pneunet-design-1'"),
+        (
+            "pressure_kPa = 20",
+            'schema = "other"\npressure_kPa = 20',
+            "schema = 'other' is not 'pneunet-design-1'",
+        ),
         ("pressure_kPa = 20", "pressure_kPa = 20\nresult = 5", r"\[result\]: must be a table"),
         ("[material]\nmu_MPa = 0.3", "", "key 'material' is missing"),
         ("mu_MPa", "mu_kPa", r"\[material\]: key 'mu_kPa' has the wrong unit: write 'mu_MPa'"),
-        (MINIMAL, "pressure_kPa = 20\nsegment = [1]\nmaterial.mu_MPa = 0.3", r"\[\[segment\]\] 1: must be a table"),
-        ("mu_MPa = 0.3", "mu_MPa = 0.3\nlaw = [1]", r"\[material\]: unknown law '\[1\]': known laws are neo-Hookean"),
+        (
+            MINIMAL,
+            "pressure_kPa = 20\nsegment = [1]\nmaterial.mu_MPa = 0.3",
+            r"\[\[segment\]\] 1: must be a table",
+        ),
+        (
+            "mu_MPa = 0.3",
+            "mu_MPa = 0.3\nlaw = [1]",
+            r"\[material\]: unknown law '\[1\]': known laws are neo-Hookean",
+        ),
         ("[[segment]]", "[segment]", r"\[\[segment\]\], with double brackets"),
         ("chambers = 3", "chambers = 2.5", r"\[\[segment\]\] 1: 'chambers' must be a whole number"),
         ("chambers = 3", "chambers = 0", r"\[\[segment\]\] 1: chambers = 0"),
         ("angle_deg", "angel_deg", r"\[\[segment\]\] 1: unknown key 'angel_deg': did you mean 'angle_deg'"),
         ("angle_deg = 60", "angle_rad = 1", r"\[\[segment\]\] 1: key 'angle_rad' has the wrong unit"),
-        ("chambers = 3", "chambers = 3\nlayer_thickness_mm = 0.5", r"\[\[segment\]\] 1: layer_thickness_mm = 0.5 needs a material"),
-        ("mu_MPa = 0.3", 'silicone = "Ecoflex"', r"\[material\]: silicone = 'Ecoflex' is not in the table: known are Ecoflex 00-10"),
+        (
+            "chambers = 3",
+            "chambers = 3\nlayer_thickness_mm = 0.5",
+            r"\[\[segment\]\] 1: layer_thickness_mm = 0.5 needs a material",
+        ),
+        (
+            "mu_MPa = 0.3",
+            'silicone = "Ecoflex"',
+            r"\[material\]: silicone = 'Ecoflex' is not in the table: known are Ecoflex 00-10",
+        ),
         ("chambers = 3", 'chambers = 3\nmaterial = "soft"', r"\[\[segment\]\] 1 material: must be a table"),
-        ("chambers = 3", "chambers = 3\n[base]\norigin_mm = [1, 2]", r"\[base\]: 'origin_mm' must be numbers"),
-        ("chambers = 3", "chambers = 3\n[base]\norigin_mm = [1, 2, nan]", r"\[base\]: 'origin_mm' must be numbers"),
+        (
+            "chambers = 3",
+            "chambers = 3\n[base]\norigin_mm = [1, 2]",
+            r"\[base\]: 'origin_mm' must be numbers",
+        ),
+        (
+            "chambers = 3",
+            "chambers = 3\n[base]\norigin_mm = [1, 2, nan]",
+            r"\[base\]: 'origin_mm' must be numbers",
+        ),
         (
             "chambers = 3",
             "chambers = 3\n[base]\nrotation = [[1,0,0],[0,1,0],[0,0,-1]]",
             r"\[base\]: 'rotation' is not a rotation matrix",
         ),
-        ("chambers = 3", "chambers = 3\n[base]\norigin = [1, 2, 3]", r"\[base\]: key 'origin' has the wrong unit"),
+        (
+            "chambers = 3",
+            "chambers = 3\n[base]\norigin = [1, 2, 3]",
+            r"\[base\]: key 'origin' has the wrong unit",
+        ),
         ("chambers = 3", "chambers = 3\n[[base]]\n", r"\[base\]"),
     ],
 )

@@ -57,7 +57,8 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
     normals = np.cross(cavity[:, 1] - cavity[:, 0], cavity[:, 2] - cavity[:, 0]) / 2
     assert abs(np.einsum("nk,nk->", cavity.mean(axis=1), normals) / 3) == pytest.approx(facts["cavity_mm3"])
     assert normals.sum(axis=0) == pytest.approx(0.0, abs=1e-9)
-    # the channel's wall: on its four sides, from half a pitch before the first chamber to half a pitch after the last
+    # the channel's wall: on its four sides, from half a pitch before the first chamber to half a pitch after
+    # the last
     x, y, z = np.moveaxis(channel, 2, 0)
     on_side = np.ptp(y, axis=1) < 1e-9
     assert abs(y[on_side]) == pytest.approx(2.0) and abs(z[~on_side]) == pytest.approx(1.0)
@@ -69,7 +70,9 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
 
 def test_the_same_mesh_again(meshed, tmp_path):
     again = mesh.mesh_manipulator(BOTH, 4.0, tmp_path)
-    assert {k: v for k, v in again.items() if k != "seconds"} == {k: v for k, v in meshed[1].items() if k != "seconds"}
+    assert {k: v for k, v in again.items() if k != "seconds"} == {
+        k: v for k, v in meshed[1].items() if k != "seconds"
+    }
 
 
 @pytest.mark.parametrize("angle", [45.0, 135.0])
@@ -99,7 +102,9 @@ def test_nothing_is_left_of_a_mesh_that_fails(tmp_path, monkeypatch):
 def test_quality_and_volume_of_tetrahedra():
     regular = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
     corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
-    volumes, quality = mesh.tet_volumes_and_quality(np.stack([regular, corner, corner[[1, 0, 2, 3]], corner * [1, 1, 0]]))
+    volumes, quality = mesh.tet_volumes_and_quality(
+        np.stack([regular, corner, corner[[1, 0, 2, 3]], corner * [1, 1, 0]])
+    )
     assert abs(volumes) == pytest.approx([8 / 3, 1 / 6, 1 / 6, 0]) and volumes[1] == -volumes[2] > 0
     assert abs(quality[0]) == pytest.approx(1.0) and quality[3] == 0.0 and quality[2] == -quality[1] < 0
 

@@ -18,16 +18,23 @@ BODIES = [
 @pytest.mark.parametrize("segment", BODIES, ids=lambda s: s.kind)
 def test_faces_of_one_cell_go_to_those_of_the_other(segment):
     s = segment
-    other = replace(s, angle=55.0, width=1.1 * s.width, wall=0.9 * s.wall, gap=1.2 * s.gap, roof=0.95 * s.roof)
+    other = replace(
+        s, angle=55.0, width=1.1 * s.width, wall=0.9 * s.wall, gap=1.2 * s.gap, roof=0.95 * s.roof
+    )
 
     def on_wall(s):
         """Places on a chamber's slanted outer wall, the first and last at its sides and at bottom and top."""
-        y, z = s.width / 2 * np.array([-1, -0.3, 0.5, 1]), np.array([0, 0.5, 0.8, 1]) * (s.chamber_top - s.core_top) + s.core_top
+        y, z = (
+            s.width / 2 * np.array([-1, -0.3, 0.5, 1]),
+            np.array([0, 0.5, 0.8, 1]) * (s.chamber_top - s.core_top) + s.core_top,
+        )
         return np.column_stack([y * s.cot + s.chamber_thickness / 2 / s.sin, y, z])
 
     start = on_wall(segment)
     there = moved(start, segment, other)
-    assert there[:, 0] - there[:, 1] * other.cot == pytest.approx(np.full(4, other.chamber_thickness / 2 / other.sin))
+    assert there[:, 0] - there[:, 1] * other.cot == pytest.approx(
+        np.full(4, other.chamber_thickness / 2 / other.sin)
+    )
     assert there[[0, -1]] == pytest.approx(on_wall(other)[[0, -1]])
     assert moved(there, other, segment) == pytest.approx(start)
 
@@ -36,12 +43,18 @@ def test_faces_of_one_cell_go_to_those_of_the_other(segment):
 def test_a_cell_stays_periodic_and_keeps_its_orientation(segment):
     rng = np.random.default_rng(0)
     low = segment.core_bottom if segment.kind == ONE_SIDED else -segment.chamber_top
-    x = rng.uniform([-segment.pitch / 2, -segment.width / 2, low], [segment.pitch / 2, segment.width / 2, segment.chamber_top], (200, 3))
+    x = rng.uniform(
+        [-segment.pitch / 2, -segment.width / 2, low],
+        [segment.pitch / 2, segment.width / 2, segment.chamber_top],
+        (200, 3),
+    )
     x[:, 0] += segment.cot * x[:, 1] if segment.kind == ONE_SIDED else 0.0
     for name, change in DIRECTIONS[segment.kind].items():
         other = changed(segment, change, 1.0 if name == "angle" else 0.02)
         step = np.array([segment.pitch, 0, 0])
-        assert moved(x + step, segment, other) - moved(x, segment, other) == pytest.approx(np.tile([other.pitch, 0, 0], (200, 1)), abs=1e-9)
+        assert moved(x + step, segment, other) - moved(x, segment, other) == pytest.approx(
+            np.tile([other.pitch, 0, 0], (200, 1)), abs=1e-9
+        )
         h = 1e-6
         columns = [(moved(x + h * e, segment, other) - moved(x, segment, other)) / h for e in np.eye(3)]
         assert (np.linalg.det(np.stack(columns, axis=2)) > 0.5).all()

@@ -32,12 +32,21 @@ PAPER = NeoHookean(mu=50.0, name="paper")
         ({"cavity_floor": 1.2}, r"cavity_floor_mm = 1.2 must lie in -1\.\.1 "),
         ({"cavity_floor": -1.2}, r"cavity_floor_mm = -1.2 must lie in -1\.\.1 "),
         ({"kind": "twisting", "cavity_floor": -0.2}, r"cavity_floor_mm = -0.2 must lie in 0\.\.1 "),
-        ({"chamber_height": 0.5, "top_wall": 0.5}, "chamber_height_mm = 0.5: .* does not rise above the core"),
+        (
+            {"chamber_height": 0.5, "top_wall": 0.5},
+            "chamber_height_mm = 0.5: .* does not rise above the core",
+        ),
         ({"layer_thickness": 0.5}, r"layer_thickness_mm = 0.5 needs a material: write \[layer_material\]"),
-        ({"layer_thickness": 2.0, "layer_material": PAPER}, r"layer_thickness_mm = 2 must lie in 0\.05\.\.1\.95: .* base_thickness_mm = 2"),
+        (
+            {"layer_thickness": 2.0, "layer_material": PAPER},
+            r"layer_thickness_mm = 2 must lie in 0\.05\.\.1\.95: .* base_thickness_mm = 2",
+        ),
         ({"layer_thickness": -0.5, "layer_material": PAPER}, "layer_thickness_mm = -0.5 must lie in"),
         ({"layer_material": PAPER}, "layer_thickness_mm is missing or 0"),
-        ({"kind": "twisting", "layer_thickness": 0.5, "layer_material": PAPER}, "layer_thickness_mm = 0.5: only a one-sided segment"),
+        (
+            {"kind": "twisting", "layer_thickness": 0.5, "layer_material": PAPER},
+            "layer_thickness_mm = 0.5: only a one-sided segment",
+        ),
         ({"angle": 90.0, "gap": 4.0}, r"end_margin_mm = 2 .* at least 2\.5 mm is needed with gap_mm = 4"),
     ],
 )
@@ -49,7 +58,8 @@ def test_segments_that_cannot_be_built_are_refused(change, message):
 
 @pytest.mark.parametrize(
     "name",
-    "chamber_height cavity_thickness wall gap top_wall side_wall base_thickness roof channel_width channel_height end_margin width".split(),
+    "chamber_height cavity_thickness wall gap top_wall side_wall base_thickness roof channel_width"
+    " channel_height end_margin width".split(),
 )
 def test_every_dimension_must_be_positive(name):
     with pytest.raises(InputError, match=f"^{name}_mm = -0.5 must be larger than 0$"):
@@ -65,8 +75,11 @@ def test_the_fix_that_an_error_names_is_accepted():
 @pytest.mark.parametrize("angle", [45.0, 60.0, 90.0, 120.0])
 @pytest.mark.parametrize("chambers", [1, 4])
 def test_lengths_in_closed_form(angle, chambers):
-    """What is t across the chambers is t/sin(angle) along the axis; slanted ends need W/2 |cot(angle)| more."""
-    s = Segment("one-sided", angle, chambers, cavity_thickness=2.5, wall=0.8, gap=1.2, width=11.0, end_margin=1.9)
+    """What is t across the chambers is t/sin(angle) along the axis; slanted ends need W/2 |cot(angle)|
+    more."""
+    s = Segment(
+        "one-sided", angle, chambers, cavity_thickness=2.5, wall=0.8, gap=1.2, width=11.0, end_margin=1.9
+    )
     sin, cot = np.sin(np.radians(angle)), 1 / np.tan(np.radians(angle))
     assert s.pitch == pytest.approx(5.3 / sin)
     assert s.active_length == pytest.approx(((chambers - 1) * 5.3 + 4.1) / sin)
@@ -93,7 +106,9 @@ def test_chambers_across_the_beam_are_exactly_straight():
 def test_mirror_image():
     mirrored = ONE_SIDED.mirrored
     assert mirrored.angle == 120.0 and mirrored.mirrored == ONE_SIDED
-    assert mirrored.cot == pytest.approx(-ONE_SIDED.cot) and mirrored.length == pytest.approx(ONE_SIDED.length)
+    assert mirrored.cot == pytest.approx(-ONE_SIDED.cot) and mirrored.length == pytest.approx(
+        ONE_SIDED.length
+    )
     assert Manipulator((ONE_SIDED, TWISTING)).mirrored.segments == (mirrored, TWISTING.mirrored)
 
 

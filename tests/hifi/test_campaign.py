@@ -1,4 +1,5 @@
-"""The sample of a campaign and its prescribed strains; the command itself is in tests/pneunet/test_campaign.py."""
+"""The sample of a campaign and its prescribed strains; the command itself is in
+tests/pneunet/test_campaign.py."""
 
 import numpy as np
 import pytest
@@ -26,12 +27,20 @@ def test_more_designs_keep_the_first_ones(tmp_path):
     names = {d.case.name for d in many.designs}
     assert len(few.designs) == 10 and {d.case.name for d in few.designs} < names and len(names) == 40
     assert {d.index for d in many.designs if d.held_out} == {2, 5, 8, 11, 14, 17}
-    assert [d.index for d in many.designs] == sorted(d.index for d in many.designs)  # ended half way it is a smaller one
+    # ended half way it is a smaller one
+    assert [d.index for d in many.designs] == sorted(d.index for d in many.designs)
 
 
 def test_edge_designs_are_further_ones_that_lie_further_out_and_train_the_law(tmp_path):
-    plain, fine = "designs = 6\nkinds = ['twisting']\nheld_out_every = 3\n", "[[mesh]]\nname = 'fine'\nmesh_size_mm = 1\nevery = 5\n"
-    meshes = "[[mesh]]\nname = 'coarse'\nmesh_size_mm = 2\n" + fine + "[edge_ranges.twisting]\nangle_deg = [30, 90]"
+    plain, fine = (
+        "designs = 6\nkinds = ['twisting']\nheld_out_every = 3\n",
+        "[[mesh]]\nname = 'fine'\nmesh_size_mm = 1\nevery = 5\n",
+    )
+    meshes = (
+        "[[mesh]]\nname = 'coarse'\nmesh_size_mm = 2\n"
+        + fine
+        + "[edge_ranges.twisting]\nangle_deg = [30, 90]"
+    )
     few, many = (campaign(tmp_path, plain + f"edge_designs = {n}\n" + meshes) for n in (3, 64))
     ordinary = campaign(tmp_path, plain + meshes).designs
     # fine meshes are for every fifth of the first six
@@ -47,11 +56,19 @@ def test_edge_designs_are_further_ones_that_lie_further_out_and_train_the_law(tm
 
 def test_further_designs_are_those_of_a_larger_sample_and_on_offer_is_what_they_may_be(tmp_path):
     plain = "kinds = ['twisting']\nheld_out_every = 3\n"
-    meshes = "[[mesh]]\nname = 'coarse'\nmesh_size_mm = 2\n[[mesh]]\nname = 'fine'\nmesh_size_mm = 1\nevery = 7\n"
+    meshes = (
+        "[[mesh]]\nname = 'coarse'\nmesh_size_mm = 2\n[[mesh]]\nname = 'fine'\nmesh_size_mm = 1\nevery = 7\n"
+    )
     few = campaign(tmp_path, "designs = 2\n" + plain + meshes + "[further]\ntwisting = [9, 7]")
     many = {(d.index, d.mesh.name): d for d in campaign(tmp_path, "designs = 12\n" + plain + meshes).designs}
     # fine meshes are for every seventh of the first two
-    assert [(d.index, d.mesh.name) for d in few.designs] == [(0, "coarse"), (0, "fine"), (1, "coarse"), (7, "coarse"), (9, "coarse")]
+    assert [(d.index, d.mesh.name) for d in few.designs] == [
+        (0, "coarse"),
+        (0, "fine"),
+        (1, "coarse"),
+        (7, "coarse"),
+        (9, "coarse"),
+    ]
     assert all(d.case == many[d.index, d.mesh.name].case for d in few.designs)
     offered = on_offer(few, "twisting", 10)
     assert [index for index, _ in offered] == [3, 4, 6, 10]
@@ -85,20 +102,27 @@ def test_designs_fill_their_ranges_evenly_and_all_can_be_built(kind):
         low, high = RANGES[kind][name]
         values = np.array([getattr(s, attribute) for s in bodies])
         # a scrambled Sobol sequence of 64 puts one point into each 64th
-        assert sorted(((values - low) / (high - low) * 64).astype(int).clip(0, 63)) == pytest.approx(np.arange(64), abs=1)
+        assert sorted(((values - low) / (high - low) * 64).astype(int).clip(0, 63)) == pytest.approx(
+            np.arange(64), abs=1
+        )
     assert all(s.side_wall == s.top_wall for s in bodies)
 
 
 def test_shape_numbers_do_not_change_with_size():
     a, b = (
-        segments(TWISTING, {k: tuple(f * v for v in r) if k.endswith("mm") else r for k, r in RANGES[TWISTING].items()}, 1, 1)[0]
+        segments(
+            TWISTING,
+            {k: tuple(f * v for v in r) if k.endswith("mm") else r for k, r in RANGES[TWISTING].items()},
+            1,
+            1,
+        )[0]
         for f in (1, 2)
     )
     assert b.width == pytest.approx(2 * a.width, abs=1e-3)
     assert shape_numbers(b) == pytest.approx(shape_numbers(a), rel=1e-3)
-    assert shape_numbers(a)[[SHAPE.index("cavity_thickness"), SHAPE.index("gap")]].sum() + 2 * shape_numbers(a)[
-        SHAPE.index("wall")
-    ] == pytest.approx(1)
+    assert shape_numbers(a)[[SHAPE.index("cavity_thickness"), SHAPE.index("gap")]].sum() + 2 * shape_numbers(
+        a
+    )[SHAPE.index("wall")] == pytest.approx(1)
 
 
 def test_prescribed_strains_take_the_energy_they_are_told():
@@ -111,7 +135,9 @@ def test_prescribed_strains_take_the_energy_they_are_told():
         assert change @ K @ change == pytest.approx(p.amplitude**2 * free, rel=1e-5)
         assert 0.4 <= p.amplitude <= 1.5
     twofold = prescribed_states(ONE_SIDED, 1, 1, 5)[0][0]
-    assert q + prescribed_change(q, K, twofold.amplitude, twofold.direction) == pytest.approx([1.2, 0.04, 0, 0.06, 0.4, 0])
+    assert q + prescribed_change(q, K, twofold.amplitude, twofold.direction) == pytest.approx(
+        [1.2, 0.04, 0, 0.06, 0.4, 0]
+    )
 
 
 def test_first_touch_lies_where_the_wall_distance_would_pass_zero_and_before_walls_push():
@@ -130,9 +156,15 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
     like = "seed = 1\n[[mesh]]\nname = 'coarse'\nmesh_size_mm = "
     assert len(taken_over(campaign(tmp_path, like + "2.0"), DATA_SET).cases) > 200
     further = campaign(tmp_path, "designs = 3\n" + like + "2.0\n[further]\ntwisting = [300, 520]")
-    assert {d.index for d in further.designs if d.case.name in taken_over(further, DATA_SET).cases} == {0, 1, 2, 300}
+    assert {d.index for d in further.designs if d.case.name in taken_over(further, DATA_SET).cases} == {
+        0,
+        1,
+        2,
+        300,
+    }
     edges = "edge_designs = 2\n" + like + "2.0\n[edge_ranges.twisting]\nangle_deg = [30, 90]"
-    assert len(taken_over(campaign(tmp_path, edges), DATA_SET).cases) > 200  # it has none of those, so theirs may lie anywhere
+    # it has none of those, so theirs may lie anywhere
+    assert len(taken_over(campaign(tmp_path, edges), DATA_SET).cases) > 200
     with pytest.raises(InputError, match="its mesh is .*extend it with the same"):
         taken_over(campaign(tmp_path, like + "3.0"), DATA_SET)
     with pytest.raises(InputError, match="seed = 1, the campaign's 2: extend it with the same"):
@@ -149,8 +181,14 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
         ('[[mesh]]\nname = "a"\nmesh_size_mm = 2\nslopes = 1', "slopes = 1 must be true or false"),
         ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
         ("[ranges.one-sided]\nangle_deg = [10, 20]", "outside 30..150"),
-        ("edge_designs = 2\n[edge_ranges.twisting]\nangle_deg = [10, 20]", r"\[edge_ranges.twisting\].*outside 30..150"),
-        ("designs = 9\n[further]\ntwisting = [8, 12]", r"\[further\]: twisting must be a list of different whole numbers in 9.."),
+        (
+            "edge_designs = 2\n[edge_ranges.twisting]\nangle_deg = [10, 20]",
+            r"\[edge_ranges.twisting\].*outside 30..150",
+        ),
+        (
+            "designs = 9\n[further]\ntwisting = [8, 12]",
+            r"\[further\]: twisting must be a list of different whole numbers in 9..",
+        ),
         ("[further]\nboth = [300]", r"\[further\].*both"),
         ("[edge_ranges.one-sided]\nwalls_mm = [1, 2]", r"\[edge_ranges\].one-sided.*walls_mm"),
     ],

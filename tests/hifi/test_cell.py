@@ -44,7 +44,11 @@ def held(segment, path, pressure, strains):
 
 
 def follow(system, target, size):
-    run_steps(EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)), target, size)
+    run_steps(
+        EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)),
+        target,
+        size,
+    )
 
 
 @pytest.fixture
@@ -76,7 +80,9 @@ def test_stiffness_is_symmetric_positive_and_the_slope_of_forces(one_sided, tmp_
     direction = np.array([0.01, -0.005, 0.004, 0.001, 0.0008, -0.0006])
     h = 0.05
     ahead, behind = (held(one_sided, path, 0.02, free + s * h * direction) for s in (1, -1))
-    assert (ahead - behind) / (2 * h) == pytest.approx(K @ direction, rel=1e-4, abs=1e-4 * np.linalg.norm(K @ direction))
+    assert (ahead - behind) / (2 * h) == pytest.approx(
+        K @ direction, rel=1e-4, abs=1e-4 * np.linalg.norm(K @ direction)
+    )
 
 
 def test_a_stiff_bottom_layer_keeps_its_length(one_sided, tmp_path):
@@ -119,9 +125,12 @@ def test_the_place_of_the_cut_does_not_matter(one_sided, tmp_path):
 
 
 def test_what_no_section_frame_can_change(one_sided, tmp_path):
-    """Another gauge is another frame, whose strains and stiffness differ; |k|, k.e and the screw's compliance are the body's own."""
+    """Another gauge is another frame, whose strains and stiffness differ; |k|, k.e and the screw's compliance
+    are the body's own."""
     mesh_cell(one_sided, 3.0, tmp_path / "cell.msh")
-    state, other = (at_gauge(one_sided, tmp_path / "cell.msh", gauge=g) for g in ((cad.CHANNEL,), (cad.CAVITY,)))
+    state, other = (
+        at_gauge(one_sided, tmp_path / "cell.msh", gauge=g) for g in ((cad.CHANNEL,), (cad.CAVITY,))
+    )
     assert abs(other.strains.e[1] - state.strains.e[1]) > 0.01
     assert np.linalg.norm(other.strains.k) == pytest.approx(np.linalg.norm(state.strains.k), rel=1e-7)
     assert other.strains.k @ other.strains.e == pytest.approx(state.strains.k @ state.strains.e, rel=1e-7)
@@ -129,7 +138,8 @@ def test_what_no_section_frame_can_change(one_sided, tmp_path):
 
 
 def test_prescribed_curvature_leaves_the_other_strains_free(one_sided, tmp_path):
-    """Holding k2 alone: its moment is what it takes, all other forces vanish; at the free value that moment does too."""
+    """Holding k2 alone: its moment is what it takes, all other forces vanish; at the free value that moment
+    does too."""
     path = tmp_path / "cell.msh"
     free, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1), path)
     change = 0.002
@@ -142,7 +152,8 @@ def test_prescribed_curvature_leaves_the_other_strains_free(one_sided, tmp_path)
 
 
 def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
-    """The case `ballooning`, without a contact model: pressure rises to a limit near 47 kPa and falls beyond it."""
+    """The case `ballooning`, without a contact model: pressure rises to a limit near 47 kPa and falls beyond
+    it."""
     segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.208))
     states, limits = [], []
     case = CellCase(segment, 0.05, 4.0, 8, control="volume", volume_factor=8.0)
@@ -152,19 +163,32 @@ def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
     assert 0 < top < len(states) - 1
     assert 0.042 < pressure[top] < 0.052
     [limit] = limits
-    assert limit.load == pytest.approx(pressure[top], rel=5e-3) and states[top - 1].volume < limit.volume < states[top + 1].volume
+    assert (
+        limit.load == pytest.approx(pressure[top], rel=5e-3)
+        and states[top - 1].volume < limit.volume < states[top + 1].volume
+    )
     assert (np.diff(pressure[: top + 1]) > 0).all() and (np.diff(pressure[top:]) < 0).all()
-    # stable at fixed pressure before the limit, one unstable direction beyond it (further on, at 9 volumes, a branch leaves
-    # this path, which has a second one from there)
+    # stable at fixed pressure before the limit, one unstable direction beyond it (further on, at 9 volumes, a
+    # branch leaves this path, which has a second one from there)
     assert (unstable[:top] == 0).all() and (unstable[top + 1 :] == 1).all()
 
 
 def test_the_command_leaves_a_table_and_a_record(tmp_path):
     (tmp_path / "cell.toml").write_text(
-        'pressure_kPa = 10\nmesh_size_mm = 2.5\nlevels = 2\n[material]\nmu_MPa = 0.2068\n[segment]\nkind = "one-sided"\nangle_deg = 60\n'
+        "pressure_kPa = 10\nmesh_size_mm = 2.5\nlevels = 2\n[material]\nmu_MPa = 0.2068\n[segment]\nkind ="
+        ' "one-sided"\nangle_deg = 60\n'
     )
     run_cell(tmp_path / "cell.toml", tmp_path, say=lambda text: None)
-    names = ["pressure_kPa", "e1", "k1_rad_per_mm", "k_norm_per_mm", "unstable_directions", "K11", "K44", "kirchhoff22"]
+    names = [
+        "pressure_kPa",
+        "e1",
+        "k1_rad_per_mm",
+        "k_norm_per_mm",
+        "unstable_directions",
+        "K11",
+        "K44",
+        "kirchhoff22",
+    ]
     table = read_columns(tmp_path / "cell" / "cell.csv", names)
     assert table[:, 0] == pytest.approx([0, 5, 10])
     assert table[0, 1:4] == pytest.approx([1, 0, 0], abs=1e-12)

@@ -66,7 +66,10 @@ def test_contact_changes_nothing_before_first_touch_and_keeps_walls_apart_beyond
     assert open_.strains.k[0] == pytest.approx(loose[0][5].strains.k[0], rel=1e-6)
     assert not last.walls_overlap and abs(last.wall_distance) < 0.02 * tall.gap
     # walls that push at each other turn the chambers further
-    assert last.contact.force > 0 and -0.02 * tall.gap < last.contact.nearest <= last.contact.farthest < 0.02 * tall.gap
+    assert (
+        last.contact.force > 0
+        and -0.02 * tall.gap < last.contact.nearest <= last.contact.farthest < 0.02 * tall.gap
+    )
     assert last.strains.k[0] > 1.01 * loose[0][-1].strains.k[0]
 
 
@@ -78,7 +81,11 @@ def test_contact_is_complete_in_the_rod_s_forces_and_stiffness(touching):
 
 
 def follow(system, target, first):
-    run_steps(EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)), target, StepSize(first, 1e-5))
+    run_steps(
+        EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)),
+        target,
+        StepSize(first, 1e-5),
+    )
 
 
 def test_in_contact_stiffness_is_the_slope_of_forces_at_prescribed_strains(tall, tmp_path):
@@ -98,7 +105,9 @@ def test_in_contact_stiffness_is_the_slope_of_forces_at_prescribed_strains(tall,
     free.destroy()
     assert state.contact.force > 0.01
     product = state.stiffness @ direction
-    assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(product, rel=1e-4, abs=1e-4 * np.linalg.norm(product))
+    assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(
+        product, rel=1e-4, abs=1e-4 * np.linalg.norm(product)
+    )
 
 
 def test_a_prescribed_twist_in_contact(touching, tall, tmp_path):
@@ -113,14 +122,17 @@ def test_a_prescribed_twist_in_contact(touching, tall, tmp_path):
 def test_volume_control_goes_through_contact(touching, tall, tmp_path):
     """Led by the volume the path comes by the states that the pressure leads to."""
     first, last = touching[0][0], touching[0][-1]
-    states, touches = run(tall, tmp_path, "auto", 1, control="volume", volume_factor=last.volume / first.volume)
+    states, touches = run(
+        tall, tmp_path, "auto", 1, control="volume", volume_factor=last.volume / first.volume
+    )
     assert touches == pytest.approx(touching[1], rel=0.05)
     assert states[-1].pressure == pytest.approx(last.pressure, rel=1e-6)
     assert states[-1].contact.force == pytest.approx(last.contact.force, rel=1e-5)
 
 
 def test_the_third_medium_finds_the_same_contact(touching, tall, tmp_path):
-    """Its bias thickens walls by what is left of the medium, so that they push earlier: shortly after first touch by a tenth."""
+    """Its bias thickens walls by what is left of the medium, so that they push earlier: shortly after first
+    touch by a tenth."""
     states, _ = run(tall, tmp_path, "third-medium", 1)
     here, there = states[-1], touching[0][-1]
     assert here.contact.gamma == pytest.approx(ThirdMedium().gamma[1]) and not here.walls_overlap
@@ -135,7 +147,9 @@ def test_both_walls_of_a_gap_are_whole_and_a_gap_apart(tall, tmp_path):
     for gap in walls.gaps:
         for wall in gap:
             x = walls.positions(wall)[:, :3]
-            assert np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum() / 2 == pytest.approx(area)
+            assert np.linalg.norm(
+                np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1
+            ).sum() / 2 == pytest.approx(area)
     assert walls.distance() == pytest.approx(tall.gap, abs=1e-9)
 
 
@@ -147,5 +161,10 @@ def test_a_straight_medium_seen_from_a_twisting_frame_is_at_rest(tall, tmp_path)
     problem.strains.value[:] = [1, 0, 0, twist, 0, 0]
     twisted = np.abs(problem.contact_forces()).max()
     back = exp_rotation(-twist * X[:, :1] * [1.0, 0.0, 0.0])
-    problem.state.x.array[problem.displacement_dofs] = np.einsum("nij,nj->ni", back, X * [0, 1, 1]) - X * [0, 1, 1]
-    assert np.abs(problem.contact_forces()).max() < 0.02 * twisted  # what quadratic elements miss of the rotation
+    problem.state.x.array[problem.displacement_dofs] = np.einsum("nij,nj->ni", back, X * [0, 1, 1]) - X * [
+        0,
+        1,
+        1,
+    ]
+    # what quadratic elements miss of the rotation
+    assert np.abs(problem.contact_forces()).max() < 0.02 * twisted

@@ -84,21 +84,27 @@ def test_pressure_control_says_that_a_limit_point_is_likely(sphere):
 
 
 def half_chevron(X):
-    """What makes of a box half of a shallow arch of two straight strips, which rises by RISE from its clamp to its middle."""
+    """What makes of a box half of a shallow arch of two straight strips, which rises by RISE from its clamp
+    to its middle."""
     return X - [0.0, 1.0, 0.5] + X[:, :1] * [0.0, 0.0, RISE / HALF_SPAN]
 
 
 def test_arc_length_follows_an_arch_that_snaps_through():
-    """A dead force on the middle: it rises, falls and rises again. Pushing the middle down step by step takes the same forces but
-    for an end effect, some 4 % of the largest: the pushed face may not deform in its plane, where the strips bend most."""
+    """A dead force on the middle: it rises, falls and rises again. Pushing the middle down step by step takes
+    the same forces but for an end effect, some 4 % of the largest: the pushed face may not deform in its
+    plane, where the strips bend most."""
     mesh = bodies.box((HALF_SPAN, 2, 1), (20, 2, 2), half_chevron)
     clamp, plane = Support(bodies.PLANE_X), Support(bodies.END, 0)
 
     def depth(problem):
         """Mean way down of the middle's face, mm."""
-        return RISE - FaceQuadrature(problem, bodies.END).moments(problem.nodes + problem.displacement())[1][2]
+        return (
+            RISE - FaceQuadrature(problem, bodies.END).moments(problem.nodes + problem.displacement())[1][2]
+        )
 
-    pushed = body_system(mesh, [clamp, plane, Support(bodies.END, 2, lambda X, load: -load + 0 * X[:, 0])], [], spacing=2.0)
+    pushed = body_system(
+        mesh, [clamp, plane, Support(bodies.END, 2, lambda X, load: -load + 0 * X[:, 0])], [], spacing=2.0
+    )
     depths, forces = [0.0], [0.0]
 
     def push(step):
@@ -109,7 +115,9 @@ def test_arc_length_follows_an_arch_that_snaps_through():
     pushed.destroy()
     loaded = body_system(mesh, [clamp, plane], [EndLoad(bodies.END, force=(0.0, 0.0, -1.0))], spacing=2.0)
     path, seen = EquilibriumPath(loaded, ArcLength(loaded)), []
-    run_steps(path, 3.6, StepSize(0.1, 1e-5, 0.2), lambda step: seen.append((depth(loaded.problem), loaded.load)))
+    run_steps(
+        path, 3.6, StepSize(0.1, 1e-5, 0.2), lambda step: seen.append((depth(loaded.problem), loaded.load))
+    )
     loaded.destroy()
     top, bottom = path.limit_points
     assert (top.kind, bottom.kind) == ("maximum", "minimum") and bottom.load < 0.5 * top.load

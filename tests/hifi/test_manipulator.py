@@ -93,7 +93,8 @@ def test_mirror_design_mirrors(shared_directory):
 
 
 def test_free_segments_keep_their_symmetry(shared_directory):
-    """Twisting does not bend (k2 = k3 = 0); a one-sided segment at 90 degrees does not twist (k1 = k3 = 0)."""
+    """Twisting does not bend (k2 = k3 = 0); a one-sided segment at 90 degrees does not twist (k1 = k3 =
+    0)."""
     twisting = Segment("twisting", 60.0, 2, gap=2.0, cavity_floor=0.5, chamber_height=5.5)
     bending = Segment("one-sided", 90.0, 3)
     for name, segment, large in (("twisting", twisting, 0), ("bending", bending, 1)):

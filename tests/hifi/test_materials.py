@@ -1,4 +1,5 @@
-"""Each law through the finite element residual and tangent against its closed form, on homogeneous states of a unit cube."""
+"""Each law through the finite element residual and tangent against its closed form, on homogeneous states of
+a unit cube."""
 
 import numpy as np
 import pytest
@@ -24,7 +25,8 @@ LAWS = [
 
 
 class Cube:
-    """Residual and tangent of one material on a unit cube, as functions of a displacement gradient and a pressure."""
+    """Residual and tangent of one material on a unit cube, as functions of a displacement gradient and a
+    pressure."""
 
     def __init__(self, material):
         self.material, comm = material, MPI.COMM_WORLD
@@ -115,11 +117,16 @@ def test_simple_shear(cube):
         F = np.eye(3)
         F[0, 1] = amount
         cube.set(F, 0.0)
-        assert cube.work(F - np.eye(3)) / amount == pytest.approx(shear_stress(cube.material, amount), rel=1e-9)
+        assert cube.work(F - np.eye(3)) / amount == pytest.approx(
+            shear_stress(cube.material, amount), rel=1e-9
+        )
 
 
 def test_stress_and_tangent_are_derivatives_of_the_energy(cube):
-    F, H = np.array([[1.3, 0.2, 0.0], [-0.1, 0.8, 0.3], [0.1, 0.0, 1.1]]), np.array([[0.3, -1, 0.2], [0.5, 0.1, 0.4], [0, 0.7, -0.2]])
+    F, H = (
+        np.array([[1.3, 0.2, 0.0], [-0.1, 0.8, 0.3], [0.1, 0.0, 1.1]]),
+        np.array([[0.3, -1, 0.2], [0.5, 0.1, 0.4], [0, 0.7, -0.2]]),
+    )
     energies, works, step = [], [], 1e-3
     for k in (-2, -1, 1, 2):
         cube.set(F + k * step * H, 0.03)
@@ -137,7 +144,9 @@ def eigenvalue_energy(material, F):
     return sum(2 * mu / a**2 * (np.sum(l**a) - 3) for mu, a in material.terms)
 
 
-@pytest.mark.parametrize("F", [np.eye(3), np.diag([1.6, 0.8, 0.8]), np.diag([0.5, 1.4, 1.4]), np.diag([1.5, 1.1, 0.7])], ids=str)
+@pytest.mark.parametrize(
+    "F", [np.eye(3), np.diag([1.6, 0.8, 0.8]), np.diag([0.5, 1.4, 1.4]), np.diag([1.5, 1.1, 0.7])], ids=str
+)
 def test_ogden_stress_and_tangent_at_repeated_stretches(ogden, F):
     rng = np.random.default_rng(1)
     ogden.set(F, 0.0)
@@ -147,7 +156,11 @@ def test_ogden_stress_and_tangent_at_repeated_stretches(ogden, F):
         H /= np.linalg.norm(H)
         w = [eigenvalue_energy(ogden.material, F + k * step * H) for k in range(-4, 5)]
         first = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) @ w / step
-        second = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560]) @ w / step**2
+        second = (
+            np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
+            @ w
+            / step**2
+        )
         assert ogden.work(H) == pytest.approx(first, rel=1e-8, abs=1e-10)
         assert ogden.stiffness(H) == pytest.approx(second, rel=1e-6, abs=1e-8)
         if (F == np.eye(3)).all():
@@ -157,7 +170,9 @@ def test_ogden_stress_and_tangent_at_repeated_stretches(ogden, F):
 
 def test_a_finite_bulk_modulus_changes_the_volume(cube):
     """Uniaxial tension of a compressible cube: isochoric stress s_i - mean s, pressure p = K (J - 1)."""
-    material = type(cube.material)(*(getattr(cube.material, n) for n in cube.material.parameters), bulk_modulus=2.0)
+    material = type(cube.material)(
+        *(getattr(cube.material, n) for n in cube.material.parameters), bulk_modulus=2.0
+    )
     soft = Cube(material)  # the same form, compiled already
 
     def stresses(x):

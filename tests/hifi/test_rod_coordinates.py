@@ -47,7 +47,8 @@ def test_retraction_is_first_order_consistent(beam):
 
 
 def test_retraction_integrates_a_curling_increment(beam):
-    """The linearised velocity of growing curvature, stepped far, must curl the beam instead of stretching it."""
+    """The linearised velocity of growing curvature, stepped far, must curl the beam instead of stretching
+    it."""
     nodes, rod = beam
     h = 1e-6
     curl = np.array([0.0, 0.04, 0.0])
@@ -75,4 +76,6 @@ def test_one_station_removes_a_rigid_motion():
     rod = RodCoordinates(nodes, 40, MPI.COMM_SELF)
     motion = se3.exp_pose(rng.normal(size=6))
     assert rod.motions(se3.transform(motion, nodes)) == pytest.approx(motion[None], abs=1e-12)
-    assert rod.sections(se3.transform(motion, nodes)) == pytest.approx(np.broadcast_to(motion, (40, 4, 4)), abs=1e-12)
+    assert rod.sections(se3.transform(motion, nodes)) == pytest.approx(
+        np.broadcast_to(motion, (40, 4, 4)), abs=1e-12
+    )

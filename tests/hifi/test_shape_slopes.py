@@ -45,7 +45,9 @@ def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_pa
     # all is where it was: measured again, nothing has changed
     assert (problem.mesh.geometry.x == home).all() and problem.segment == segment
     system.factorise()
-    assert numbers(system.measure())[1] == pytest.approx(state.stiffness, rel=1e-9, abs=1e-9 * np.abs(state.stiffness).max())
+    assert numbers(system.measure())[1] == pytest.approx(
+        state.stiffness, rel=1e-9, abs=1e-9 * np.abs(state.stiffness).max()
+    )
     system.destroy()
     for direction, step in STEPS.items():
         ends = []

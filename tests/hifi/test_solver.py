@@ -29,7 +29,8 @@ def test_a_growing_pattern_keeps_settings_inertia_and_solution():
     assert solver.negative_pivots == (np.linalg.eigvalsh(dense) < 0).sum() == 3
     assert solver.factorisations == 2
     factor = solver.ksp.getPC().getFactorMatrix()
-    assert [factor.getMumpsIcntl(i) for i in (14, 24)] == [60, 1] and factor.getMumpsIcntl(13) == 1  # also what PETSc sets on one rank
+    # also what PETSc sets on one rank
+    assert [factor.getMumpsIcntl(i) for i in (14, 24)] == [60, 1] and factor.getMumpsIcntl(13) == 1
     right = np.arange(n, dtype=float)
     assert solver.solve(right[first:last]) == pytest.approx(np.linalg.solve(dense, right)[first:last])
     for each in (solver, matrix, more):

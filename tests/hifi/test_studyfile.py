@@ -28,14 +28,22 @@ def cells(of):
 
 
 def test_a_grid_is_the_full_product_in_the_order_written(tmp_path):
-    found = study(tmp_path, kind="cell", base=CELL, levels=3, grid={"angle_deg": [60, 90], "pressure_kPa": [5, 10, 20]})
+    found = study(
+        tmp_path, kind="cell", base=CELL, levels=3, grid={"angle_deg": [60, 90], "pressure_kPa": [5, 10, 20]}
+    )
     assert found.variables == ("angle_deg", "pressure_kPa")
     got = [(c.segment.angle, c.pressure, c.levels) for c in cells(found)]
     assert got == [(a, pytest.approx(p / 1e3), 3) for a in (60, 90) for p in (5, 10, 20)]
 
 
 def test_a_list_goes_through_the_grid_case_by_case(tmp_path):
-    found = study(tmp_path, kind="cell", base=CELL, case=[{"wall_mm": 1.2}, {"gap_mm": 1.5}], grid={"angle_deg": [60, 75]})
+    found = study(
+        tmp_path,
+        kind="cell",
+        base=CELL,
+        case=[{"wall_mm": 1.2}, {"gap_mm": 1.5}],
+        grid={"angle_deg": [60, 75]},
+    )
     assert [(c.segment.wall, c.segment.gap, c.segment.angle) for c in cells(found)] == [
         (1.2, 1.0, 60.0),
         (1.2, 1.0, 75.0),
@@ -47,9 +55,15 @@ def test_a_list_goes_through_the_grid_case_by_case(tmp_path):
 
 
 def test_a_named_silicone_replaces_the_material_and_keys_change_values_in_it(tmp_path):
-    listed = [{"silicone": "Dragon Skin 30"}, {"mu_MPa": 0.2}, {"density_kg_per_m3": 900.0, "silicone": "Dragon Skin 30"}]
+    listed = [
+        {"silicone": "Dragon Skin 30"},
+        {"mu_MPa": 0.2},
+        {"density_kg_per_m3": 900.0, "silicone": "Dragon Skin 30"},
+    ]
     listed += [{"material": {"law": "Yeoh", "c10_MPa": 0.1}}]
-    named, softer, lighter, yeoh = (c.segment.material for c in cells(study(tmp_path, kind="cell", base=CELL, case=listed)))
+    named, softer, lighter, yeoh = (
+        c.segment.material for c in cells(study(tmp_path, kind="cell", base=CELL, case=listed))
+    )
     assert named == silicone("Dragon Skin 30")
     assert (softer.mu, softer.density) == (0.2, pytest.approx(1e-9))
     assert (lighter.mu, lighter.density) == (named.mu, pytest.approx(0.9e-9))
@@ -80,13 +94,20 @@ def test_a_combination_that_is_no_body_keeps_its_reason(tmp_path):
 
 def test_a_case_is_known_by_its_complete_inputs(tmp_path):
     """The same body under another spelling is the same case; another mesh is another one."""
-    spelt = study(tmp_path, kind="cell", base=CELL | {"mesh_size_mm": 1.5}, case=[{"segment.angle_deg": 75, "wall_mm": 1}])
+    spelt = study(
+        tmp_path,
+        kind="cell",
+        base=CELL | {"mesh_size_mm": 1.5},
+        case=[{"segment.angle_deg": 75, "wall_mm": 1}],
+    )
     grid = study(tmp_path, kind="cell", base=CELL, grid={"angle_deg": [75.0], "mesh_size_mm": [1.5, 2]})
     assert spelt.cases[0].case.name == grid.cases[0].case.name != grid.cases[1].case.name
 
 
 def test_the_tables_of_a_cell_read_back():
-    segment = CASES["one_sided_w10"](angle=60.0, chambers=1, layer_thickness=0.5, layer_material=silicone("Mold Star 30"))
+    segment = CASES["one_sided_w10"](
+        angle=60.0, chambers=1, layer_thickness=0.5, layer_material=silicone("Mold Star 30")
+    )
     for case in (
         CellCase(segment, 0.0123, 2.5, 3, {4: 0.002}),
         CellCase(CASES["twist_w12"](angle=45.0, chambers=1), 0.05, control="volume", volume_factor=3.0),

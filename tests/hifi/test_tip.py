@@ -1,4 +1,5 @@
-"""Passive tip stiffness against differences under real tip loads and against beams; blocked force against plain statics."""
+"""Passive tip stiffness against differences under real tip loads and against beams; blocked force against
+plain statics."""
 
 import json
 
@@ -22,7 +23,8 @@ LENGTH, WIDTH, HEIGHT = STRIP = 30.0, 3.0, 2.0
 
 
 def test_a_straight_strip_is_a_beam():
-    """Compliances L/EA, L^3/3EI, L^2/2EI, L/EI with E = 3 mu = 3 MPa, and the torsion of a rectangle (Timoshenko)."""
+    """Compliances L/EA, L^3/3EI, L^2/2EI, L/EI with E = 3 mu = 3 MPa, and the torsion of a rectangle
+    (Timoshenko)."""
     mesh = bodies.strip(STRIP, (30, 3, 2))
     system = body_system(mesh, [Support(bodies.PLANE_X)], [])
     C = tip.compliance(system, bodies.END, se3.make_pose(np.eye(3), [LENGTH, 0.0, 0.0]))
@@ -34,7 +36,9 @@ def test_a_straight_strip_is_a_beam():
     beam += [LENGTH / torsion, LENGTH / (E * Iy), LENGTH / (E * Iz)]
     assert np.diag(C) == pytest.approx(beam, rel=0.04)
     # a force along z turns the tip by minus what a moment about y moves it along -z
-    assert C[4, 2] == pytest.approx(-(LENGTH**2) / (2 * E * Iy), rel=0.04) and C[5, 1] == pytest.approx(LENGTH**2 / (2 * E * Iz), rel=0.04)
+    assert C[4, 2] == pytest.approx(-(LENGTH**2) / (2 * E * Iy), rel=0.04) and C[5, 1] == pytest.approx(
+        LENGTH**2 / (2 * E * Iz), rel=0.04
+    )
 
 
 @pytest.fixture
@@ -57,11 +61,19 @@ def test_stiffness_of_an_inflated_body_is_the_slope_under_real_tip_loads(finger)
     solve.destroy()
     face = []
     for sign in (1, -1):
-        loads = DeadLoads(tip_force=tuple(sign * frame[:3, :3] @ small[:3]), tip_moment=tuple(sign * frame[:3, :3] @ small[3:]))
+        loads = DeadLoads(
+            tip_force=tuple(sign * frame[:3, :3] @ small[:3]),
+            tip_moment=tuple(sign * frame[:3, :3] @ small[3:]),
+        )
         loaded = ManipulatorSolve(*finger, newton_options=options, loads=loads)
         loaded.run(0.02)
         problem = loaded.problem
-        face.append((loaded.sections.frames()[-1], FaceQuadrature(problem, cad.TIP).moments(problem.nodes + problem.displacement())[1]))
+        face.append(
+            (
+                loaded.sections.frames()[-1],
+                FaceQuadrature(problem, cad.TIP).moments(problem.nodes + problem.displacement())[1],
+            )
+        )
         loaded.destroy()
     ahead, behind = (pose for pose, _ in face)
     turn = se3.log_rotation(ahead[:3, :3] @ behind[:3, :3].T)
@@ -75,17 +87,21 @@ def test_stiffness_of_an_inflated_body_is_the_slope_under_real_tip_loads(finger)
 
 
 def test_a_held_tip_is_pushed_by_pressure_and_gravity(finger):
-    """Base and tip together carry the weight and nothing else, since a closed cavity pushes itself nowhere."""
+    """Base and tip together carry the weight and nothing else, since a closed cavity pushes itself
+    nowhere."""
     manipulator, path = finger
     gravity = (0.0, 3000.0, -9810.0)
     held = ManipulatorSolve(manipulator, path, loads=DeadLoads(gravity=gravity), hold_tip=True)
     held.run(0.005)
-    assert held.sections.frames()[-1] == pytest.approx(se3.make_pose(np.eye(3), [manipulator.length, 0, 0]), abs=1e-9)
+    assert held.sections.frames()[-1] == pytest.approx(
+        se3.make_pose(np.eye(3), [manipulator.length, 0, 0]), abs=1e-9
+    )
     at_base, at_tip = (held.problem.reaction(tag)[0] for tag in (cad.BASE, cad.TIP))
     held.destroy()
     volume = json.loads((path.parent / "mesh.json").read_text())["body_mm3"]
     assert -(at_base + at_tip) == pytest.approx(1.07e-9 * volume * np.array(gravity), rel=1e-5, abs=1e-7)
-    loads = DeadLoads(gravity=gravity, tip_force=(1.0, 0.0, 0.0))  # which would go straight into what holds the tip
+    # which would go straight into what holds the tip
+    loads = DeadLoads(gravity=gravity, tip_force=(1.0, 0.0, 0.0))
     result = tip.blocked_force(manipulator, path, 0.005, loads, MPI.COMM_WORLD)
     assert result["force_N"] == pytest.approx(-at_tip, rel=1e-6) and result["force_N"][0] > 0.01  # it pushes
     assert result["pressure_kPa"] == pytest.approx(5.0) and result["unstable_directions"] == 0

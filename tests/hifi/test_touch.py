@@ -1,4 +1,5 @@
-"""Parts of a body that run into each other: distances of imposed shapes, the load of first touch, what a run says about it."""
+"""Parts of a body that run into each other: distances of imposed shapes, the load of first touch, what a run
+says about it."""
 
 import csv
 import json
@@ -19,13 +20,22 @@ from tests.hifi.test_manipulator import set_positions
 #: mm of undeformed length in one turn of the staircase that the reference body, 44 mm long, is wound to
 TURN = 35.0
 TALL = Segment(
-    "twisting", 60.0, 2, width=15.0, channel_width=4.0, channel_height=2.0, cavity_floor=0.5, chamber_height=7.5, gap=1.0,
+    "twisting",
+    60.0,
+    2,
+    width=15.0,
+    channel_width=4.0,
+    channel_height=2.0,
+    cavity_floor=0.5,
+    chamber_height=7.5,
+    gap=1.0,
     material=NeoHookean(0.317),
-)  # fmt: skip
+)
 
 
 def wind(solve, clear):
-    """Wind the body about y, sections staying upright, so that after a turn it passes itself with `clear` mm between its sides.
+    """Wind the body about y, sections staying upright, so that after a turn it passes itself with `clear` mm
+    between its sides.
 
     Returns the distance of two such stairs, whose sides are as steep as at the radius of the axis.
     """
@@ -60,7 +70,10 @@ def test_load_at_which_coils_touch_is_interpolated(reference):
         wind(reference, 4.0 - kPa)
         touch = reference.measure().touch
     assert touch.body_from.pressure == pytest.approx(4e-3, rel=1e-3)
-    assert touch.table()["first_body_touch_kPa"] == pytest.approx(4.0, rel=1e-3) and touch.table()["first_touch_kPa"] is None
+    assert (
+        touch.table()["first_body_touch_kPa"] == pytest.approx(4.0, rel=1e-3)
+        and touch.table()["first_touch_kPa"] is None
+    )
     wind(reference, 3.0)
     assert reference.measure().touch.body_overlap  # marked for good: how it came here cannot be
 
@@ -70,7 +83,8 @@ def test_first_zero_lies_between_its_neighbours():
     distances = np.array([1.5, 0.7, -0.4])
     assert first_zero(3 - distances[:, None] - 0.1 * distances[:, None] ** 2, distances) == pytest.approx(3.0)
     assert first_zero(loads, (2.9 - loads[:, 0]) * 2) == pytest.approx(2.9)
-    assert first_zero(loads, [1.0, 1.001, -1.0]) == pytest.approx(2.0 + 1.5 * 1.001 / 2.001)  # no parabola through a turn
+    # no parabola through a turn
+    assert first_zero(loads, [1.0, 1.001, -1.0]) == pytest.approx(2.0 + 1.5 * 1.001 / 2.001)
     assert first_zero(loads[:1], [-0.1]) == pytest.approx(1.0)
 
 
@@ -80,8 +94,14 @@ def test_what_is_marked_depends_on_contact():
         watch.see(Load(0.0), 1.0, np.inf)
         before = watch.see(Load(0.01), 0.5, np.inf)
         touch = watch.see(Load(0.03), -0.5, np.inf)
-        assert touch.walls_from.pressure == pytest.approx(0.02, abs=1e-3) and touch.walls_overlap is not contact
-        assert len(list(touch.news(before))) == 1 and not list(touch.news(touch)) and not list(before.news(Touch()))
+        assert (
+            touch.walls_from.pressure == pytest.approx(0.02, abs=1e-3) and touch.walls_overlap is not contact
+        )
+        assert (
+            len(list(touch.news(before))) == 1
+            and not list(touch.news(touch))
+            and not list(before.news(Touch()))
+        )
         assert ("without contact" in touch.text) is not contact
     dead = TouchWatch()
     dead.see(Load(0.0, 0.0), 1.0, np.inf)
@@ -102,10 +122,15 @@ def rows(path):
 
 
 def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory):
-    """Tall chambers a millimetre apart: touching at about 7.5 kPa; the run goes on later and does not forget."""
+    """Tall chambers a millimetre apart: touching at about 7.5 kPa; the run goes on later and does not
+    forget."""
     said, design = [], Design(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0, contact="none")
     last = solve_design(design, shared_directory, fields=False, say=said.append)
-    assert last.touch.walls_overlap and not last.touch.body_overlap and 6 < last.touch.walls_from.pressure * 1e3 < 9
+    assert (
+        last.touch.walls_overlap
+        and not last.touch.body_overlap
+        and 6 < last.touch.walls_from.pressure * 1e3 < 9
+    )
     again = solve_design(design, shared_directory, pressure=0.010, fields=False, say=said.append, resume=True)
     assert again.touch.walls_from.pressure == pytest.approx(last.touch.walls_from.pressure, rel=1e-9)
     if MPI.COMM_WORLD.rank == 0:
@@ -114,11 +139,20 @@ def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory):
         out = shared_directory / "solve"
         record, steps = json.loads((out / "run.json").read_text()), rows(out / "steps.csv")
         first = record["first_touch_kPa"]
-        assert record["walls_overlap"] and not record["body_overlap"] and record["first_body_touch_kPa"] is None
+        assert (
+            record["walls_overlap"] and not record["body_overlap"] and record["first_body_touch_kPa"] is None
+        )
         for row in [*steps, *rows(out / "segments.csv"), *rows(out / "centrelines.csv")]:
-            assert row["walls_overlap"] == str(int(float(row["pressure_kPa"]) > first)) and row["body_overlap"] == "0"
-        assert all((float(row["smallest_wall_distance_mm"]) < 0) == (row["walls_overlap"] == "1") for row in steps)
-        assert [step["walls_overlap"] for step in record["steps"]] == [row["walls_overlap"] == "1" for row in steps]
+            assert (
+                row["walls_overlap"] == str(int(float(row["pressure_kPa"]) > first))
+                and row["body_overlap"] == "0"
+            )
+        assert all(
+            (float(row["smallest_wall_distance_mm"]) < 0) == (row["walls_overlap"] == "1") for row in steps
+        )
+        assert [step["walls_overlap"] for step in record["steps"]] == [
+            row["walls_overlap"] == "1" for row in steps
+        ]
 
 
 def test_contact_holds_walls_apart_on_any_number_of_ranks_and_after_a_resumption(shared_directory):
@@ -132,5 +166,9 @@ def test_contact_holds_walls_apart_on_any_number_of_ranks_and_after_a_resumption
     assert again.touch.walls_from.pressure == pytest.approx(last.touch.walls_from.pressure, rel=1e-9)
     if MPI.COMM_WORLD.rank == 0:
         out = shared_directory / "solve"
-        assert float(rows(out / "steps.csv")[-1]["contact_force_N"]) == pytest.approx(again.touch.contact_force, rel=1e-9)
-        assert not json.loads((out / "run.json").read_text())["walls_overlap"] and "held apart by contact" in "".join(said)
+        assert float(rows(out / "steps.csv")[-1]["contact_force_N"]) == pytest.approx(
+            again.touch.contact_force, rel=1e-9
+        )
+        assert not json.loads((out / "run.json").read_text())[
+            "walls_overlap"
+        ] and "held apart by contact" in "".join(said)

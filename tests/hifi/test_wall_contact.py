@@ -1,4 +1,5 @@
-"""Contact of walls over a plane: two quadratic sheets, a cell's gap, pressed cylinders, and a tangent brought up to date."""
+"""Contact of walls over a plane: two quadratic sheets, a cell's gap, pressed cylinders, and a tangent brought
+up to date."""
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ LAW = PenaltyLaw(2.0, 0.02)
 
 
 class Sheet:
-    """A rectangle of `counts` x 2 quadratic triangles over x and y in +-size/2, z = height(x, y); down: seen from below."""
+    """A rectangle of `counts` x 2 quadratic triangles over x and y in +-size/2, z = height(x, y); down: seen
+    from below."""
 
     def __init__(self, counts, size, height, down=False):
         n, m = counts
@@ -43,7 +45,11 @@ class Sheet:
 def sides(first, second, law=LAW):
     """The Touching of both sides, None where nothing touches, and the (own, other) sheets of each."""
     for own, other, direction in ((first, second, UP), (second, first, -UP)):
-        yield touching(own.nodes[own.facets], own.areas, other.nodes[other.facets], direction, law), own, other
+        yield (
+            touching(own.nodes[own.facets], own.areas, other.nodes[other.facets], direction, law),
+            own,
+            other,
+        )
 
 
 def energy(first, second):
@@ -52,10 +58,15 @@ def energy(first, second):
 
 def gradient(first, second):
     """By the nodes of both sheets, one below the other, (n, 3)."""
-    out, start = np.zeros((len(first.nodes) + len(second.nodes), 3)), {id(first): 0, id(second): len(first.nodes)}
+    out, start = (
+        np.zeros((len(first.nodes) + len(second.nodes), 3)),
+        {id(first): 0, id(second): len(first.nodes)},
+    )
     for t, own, other in sides(first, second):
         if t:
-            nodes = np.concatenate([start[id(own)] + own.facets[t.facet], start[id(other)] + other.facets[t.other]], axis=1)
+            nodes = np.concatenate(
+                [start[id(own)] + own.facets[t.facet], start[id(other)] + other.facets[t.other]], axis=1
+            )
             np.add.at(out, nodes, t.forces)
     return out
 
@@ -67,7 +78,8 @@ def moved(sheet, displacement):
 
 
 def bumps(seed=1):
-    """Two curved, rough sheets of other meshes that overlap in the middle and are apart at their rims; the second lies aslant."""
+    """Two curved, rough sheets of other meshes that overlap in the middle and are apart at their rims; the
+    second lies aslant."""
     rng = np.random.default_rng(seed)
     first = Sheet((3, 4), (2.0, 2.0), lambda x, y: 0.1 - 0.2 * (x**2 + y**2))
     second = Sheet((4, 3), (2.2, 2.1), lambda x, y: 0.02 + 0.1 * x + 0.05 * x * y, down=True)
@@ -88,9 +100,12 @@ def test_forces_are_the_gradient_of_the_energy_in_blended_edges_too():
     first, second = bumps()
     direction = np.random.default_rng(2).normal(size=(len(first.nodes) + len(second.nodes), 3))
     h, n = 1e-6, len(first.nodes)
-    ends = [energy(moved(first, s * h * direction[:n]), moved(second, s * h * direction[n:])) for s in (1, -1)]
+    ends = [
+        energy(moved(first, s * h * direction[:n]), moved(second, s * h * direction[n:])) for s in (1, -1)
+    ]
     forces = gradient(first, second)
-    assert any(len(t.point) > len(t.area) for t, _, _ in sides(first, second))  # points between facets are among them
+    # points between facets are among them
+    assert any(len(t.point) > len(t.area) for t, _, _ in sides(first, second))
     assert (forces * direction).sum() == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-6)
     assert np.abs(forces).max() > 1e-3
 
@@ -100,7 +115,10 @@ def test_both_walls_are_pushed_alike_and_flat_ones_not_sideways():
     forces = gradient(first, second)
     assert forces.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-12)
     assert forces[: len(first.nodes), 2].sum() > 1e-3  # the energy grows as the first wall goes up
-    flat = Sheet((3, 2), (2.0, 2.0), lambda x, y: 0 * x), Sheet((2, 4), (4.0, 4.0), lambda x, y: 0 * x - 0.05, down=True)
+    flat = (
+        Sheet((3, 2), (2.0, 2.0), lambda x, y: 0 * x),
+        Sheet((2, 4), (4.0, 4.0), lambda x, y: 0 * x - 0.05, down=True),
+    )
     assert gradient(*flat)[:, :2] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -169,7 +187,9 @@ def pushed(tmp_path):
         for (facets, _), sign in zip(gap, (1, -1)):
             nodes = np.unique(facets)
             X = problem.nodes[nodes]
-            towards = 0.5 * segment.gap / segment.sin * (1.0 - 0.02 * (X[:, 1] / 7.5) ** 2 - 0.01 * abs(X[:, 2]))
+            towards = (
+                0.5 * segment.gap / segment.sin * (1.0 - 0.02 * (X[:, 1] / 7.5) ** 2 - 0.01 * abs(X[:, 2]))
+            )
             x[problem.reduced[problem.displacement_dofs[nodes, 0]]] += sign * towards
     system.state = x
     yield system
@@ -198,13 +218,20 @@ def test_a_cell_s_contact_is_exact_in_unknowns_and_strains(pushed):
     assert abs(K - K.T).max() < 1e-12 * abs(K).max()
     assert curvature == pytest.approx(curvature.T, abs=1e-12 * abs(curvature).max())
     rng, h = np.random.default_rng(5), 1e-7
-    # in blended edges, which the nodes' motions see and the strains' hardly, the tangent leaves out how the shares turn
-    moves = ((np.r_[rng.normal(size=n), np.zeros(6)], 2e-3), (np.r_[np.zeros(n), rng.normal(size=6) * [1, 1, 1, 0.1, 0.1, 0.1]], 1e-4))
+    # in blended edges, which the nodes' motions see and the strains' hardly, the tangent leaves out how the
+    # shares turn
+    moves = (
+        (np.r_[rng.normal(size=n), np.zeros(6)], 2e-3),
+        (np.r_[np.zeros(n), rng.normal(size=6) * [1, 1, 1, 0.1, 0.1, 0.1]], 1e-4),
+    )
     for d, tolerance in moves:
         up, down = along(pushed, d, h), along(pushed, d, -h)
         energy, by_unknowns, by_strains = ((a - b) / (2 * h) for a, b in zip(up, down))
         assert forces @ d[:n] + slope @ d[n:] == pytest.approx(energy, rel=1e-6)
-        for difference, product in ((by_unknowns, K @ d[:n] + mixed @ d[n:]), (by_strains, mixed.T @ d[:n] + curvature @ d[n:])):
+        for difference, product in (
+            (by_unknowns, K @ d[:n] + mixed @ d[n:]),
+            (by_strains, mixed.T @ d[:n] + curvature @ d[n:]),
+        ):
             assert np.linalg.norm(product - difference) < tolerance * np.linalg.norm(difference)
 
 
@@ -230,7 +257,9 @@ class Points:
     def update(self, then):
         K = np.linalg.inv(self.matrix(then))
         update = ContactUpdate(then, most=5)
-        return (lambda now: update.renew(now, lambda points: self.rows[points], lambda b: K @ b)), lambda: update.corrected(K @ self.right)
+        return (
+            lambda now: update.renew(now, lambda points: self.rows[points], lambda b: K @ b)
+        ), lambda: update.corrected(K @ self.right)
 
 
 def test_an_updated_tangent_solves_as_one_factorised_anew():
@@ -238,7 +267,9 @@ def test_an_updated_tangent_solves_as_one_factorised_anew():
     renew, solution = points.update({0: 3.0, 1: 2.0, 2: 1.0})
     for now in ({0: 3.0, 3: 2.0}, {0: 3.0, 3: 2.0, 4: 5.0, 1: 0.5}, {}):
         assert renew(now) is True
-        assert solution() == pytest.approx(np.linalg.solve(points.matrix(now), points.right), rel=1e-9, abs=1e-12)
+        assert solution() == pytest.approx(
+            np.linalg.solve(points.matrix(now), points.right), rel=1e-9, abs=1e-12
+        )
         assert renew(now) is False
 
 

@@ -70,7 +70,10 @@ CSV = {
     "repeated points": ([*CURVE, CURVE[-1]], "points 6 and 7 are the same: remove one"),
     "metres": (["0,0,0", "0.05,0,0", "0.1,0,0", "0.15,0,0"], "are its coordinates in mm?"),
     "two columns": (["0,0", "1,0", "2,0", "3,0"], "3 columns x, y, z in mm, not 2"),
-    "wrong unit": (changed("\n".join(CURVE), "y_mm", "y_m").split("\n"), "'y_m' has the wrong unit: write 'y_mm'"),
+    "wrong unit": (
+        changed("\n".join(CURVE), "y_mm", "y_m").split("\n"),
+        "'y_m' has the wrong unit: write 'y_mm'",
+    ),
     "missing column": (["x_mm,z_mm", "0,0", "1,0"], "column 'y_mm' is missing"),
     "nothing": ([], "is empty"),
 }
@@ -93,23 +96,43 @@ TARGETS = {
         "pressure_MPa = 0.04\n[[piece]]",
         ["'pressure_MPa'", "wrong unit: write 'pressure_kPa'"],
     ),
-    "pressure beyond what holds": ("[[piece]]", "pressure_kPa = 80\n[[piece]]", ["pressure_kPa = 80", "0..60 kPa"]),
+    "pressure beyond what holds": (
+        "[[piece]]",
+        "pressure_kPa = 80\n[[piece]]",
+        ["pressure_kPa = 80", "0..60 kPa"],
+    ),
     "unknown kind": ('"bending"', '"bent"', ["kind = 'bent'", "write 'twisting', 'bending' or 'helical'"]),
-    "unit of a piece": ("length_mm", "length_m", ["[[piece]] 1: key 'length_m' has the wrong unit: write 'length_mm'"]),
+    "unit of a piece": (
+        "length_mm",
+        "length_m",
+        ["[[piece]] 1: key 'length_m' has the wrong unit: write 'length_mm'"],
+    ),
     "another kind's key": ("length_mm = 50.3", "length_mm = 50.3\npitch_mm = 2", ["unknown key 'pitch_mm'"]),
     "length missing": ("length_mm = 50.3", "", ["key 'length_mm' is missing"]),
     "lengths do not add up": ("50.3", "40", ["length_mm", "add up to 40 mm but the curve is 5"]),
     "single brackets": ("[[piece]]", "[piece]", ["[[piece]], with double brackets"]),
     "not TOML": ("[[piece]]", "[[piece]", ["not valid TOML"]),
-    "side wall thicker than the body": ("[[piece]]", "[segment]\nside_wall_mm = 7\n[[piece]]", ["side_wall_mm = 7"]),
+    "side wall thicker than the body": (
+        "[[piece]]",
+        "[segment]\nside_wall_mm = 7\n[[piece]]",
+        ["side_wall_mm = 7"],
+    ),
     "negative gap": ("[[piece]]", "[segment]\ngap_mm = -1\n[[piece]]", ["gap_mm = -1 must be larger than 0"]),
-    "angle out of range": ("[[piece]]", "[vary]\nangle_deg = [20, 90]\n[[piece]]", ["angle_deg = 20", "30..150"]),
+    "angle out of range": (
+        "[[piece]]",
+        "[vary]\nangle_deg = [20, 90]\n[[piece]]",
+        ["angle_deg = 20", "30..150"],
+    ),
     "no room for a chamber": (
         "[[piece]]",
         "[segment]\nend_margin_mm = 30\n[[piece]]",
         ["length_mm", "too short for one"],
     ),
-    "not shipped": ('points = "curve.csv"', 'target = "octopuss"', ["target = 'octopuss'", "shipped are octopus"]),
+    "not shipped": (
+        'points = "curve.csv"',
+        'target = "octopuss"',
+        ["target = 'octopuss'", "shipped are octopus"],
+    ),
 }
 
 
@@ -121,7 +144,11 @@ def test_target(folder, capsys, old, new, fragments):
 
 
 DESIGNS = {
-    "unknown key": ("angle_deg", "angel_deg", "[[segment]] 1: unknown key 'angel_deg': did you mean 'angle_deg'?"),
+    "unknown key": (
+        "angle_deg",
+        "angel_deg",
+        "[[segment]] 1: unknown key 'angel_deg': did you mean 'angle_deg'?",
+    ),
     "wrong unit": (
         "pressure_kPa = 20",
         "pressure_bar = 0.2",
@@ -167,21 +194,33 @@ def test_design(folder, capsys, command, old, new, message):
         (["solve", "curve.csv"], ["curve.csv: not valid TOML"]),
         (["report", "none"], ["none: holds no design.toml", "pneunet design -o"]),
         (["report", "."], ["holds no design.toml"]),
-        (["shape", "good.toml", "--pressure-kPa", "10,ten"], ["--pressure-kPa: 'ten' is not a number", "10,20,30"]),
+        (
+            ["shape", "good.toml", "--pressure-kPa", "10,ten"],
+            ["--pressure-kPa: 'ten' is not a number", "10,20,30"],
+        ),
         (["shape", "good.toml", "--pressure-kPa", "10,,20"], ["--pressure-kPa: '' is not a number"]),
         (["shape", "good.toml", "--pressure-kPa", "nan"], ["--pressure-kPa: nan must lie in"]),
         (["shape", "good.toml", "--pressure-kPa=-5"], ["--pressure-kPa: -5 must lie in"]),
         (["solve", "good.toml", "--pressure-kPa", "10,20"], ["--pressure-kPa: one number"]),
         (["solve", "good.toml", "--pressure", "10"], ["unrecognized arguments: --pressure", "--help"]),
         (["mesh", "good.toml", "--mesh-size-mm", "0"], ["--mesh-size-mm: '0' must be a number in 0.1..20"]),
-        (["mesh", "good.toml", "--mesh-size-mm", "fine"], ["--mesh-size-mm: 'fine' must be a number in 0.1..20"]),
+        (
+            ["mesh", "good.toml", "--mesh-size-mm", "fine"],
+            ["--mesh-size-mm: 'fine' must be a number in 0.1..20"],
+        ),
         (["mesh", "good.toml", "--mesh-size-mm", "0.1"], ["mesh_size_mm = 0.1", "choose a coarser mesh"]),
         (["mesh", "good.toml", "-o", "curve.csv"], ["curve.csv: cannot be written to", "-o"]),
         (["design", "target.toml", "-o", "curve.csv"], ["curve.csv: cannot be written to", "-o"]),
         (["fit-material", "none.csv"], ["none.csv: no such file"]),
         (["fit-material", "curve.csv"], ["curve.csv: no header with a strain"]),
-        (["fit-material", "curve.csv", "--law", "Fung"], ["--law Fung: known laws are neo-Hookean,", "or all"]),
-        (["fit-material", "curve.csv", "--to-strain-percent", "-5"], ["--to-strain-percent: '-5' must be a number larger than 0"]),
+        (
+            ["fit-material", "curve.csv", "--law", "Fung"],
+            ["--law Fung: known laws are neo-Hookean,", "or all"],
+        ),
+        (
+            ["fit-material", "curve.csv", "--to-strain-percent", "-5"],
+            ["--to-strain-percent: '-5' must be a number larger than 0"],
+        ),
         (["run", "-n", "0", "solve", "good.toml"], ["-n 0: at least 1 rank"]),
         (["run", "-n", "two", "solve", "good.toml"], ["-n", "'two'"]),
         (["run", "-n", "2"], ["no command given", "pneunet run -n 2 solve DESIGN.toml"]),
@@ -200,7 +239,9 @@ def test_as_typed_and_on_two_ranks(folder):
     (folder / "bad.toml").write_text(changed(DESIGN, "chambers = 2", "chambers = 0"))
     before = files(folder)
     for ranks in ([], ["run", "-n", "2"]):
-        done = subprocess.run([PNEUNET, *ranks, "solve", "bad.toml"], capture_output=True, text=True, timeout=120)
+        done = subprocess.run(
+            [PNEUNET, *ranks, "solve", "bad.toml"], capture_output=True, text=True, timeout=120
+        )
         assert done.returncode == 2, done.stderr
         told = [line for line in done.stderr.splitlines() if "pneunet:" in line]
         assert told == ["pneunet: bad.toml [[segment]] 1: chambers = 0: a segment needs at least 1"]
@@ -212,14 +253,18 @@ def test_as_typed_and_on_two_ranks(folder):
 def test_a_folder_that_cannot_be_written_to_is_refused(folder, capsys):
     error = refused(capsys, folder, "shape", "good.toml", "-o", folder / "good.toml" / "deeper")
     assert "good.toml/deeper" in error and "choose another folder with -o" in error
-    done = subprocess.run([PNEUNET, "solve", "good.toml", "-o", "curve.csv"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [PNEUNET, "solve", "good.toml", "-o", "curve.csv"], capture_output=True, text=True, timeout=120
+    )
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
     assert "curve.csv/solve: cannot be written to" in done.stderr and "-o" in done.stderr
 
 
 def test_pressure_beyond_what_converges_keeps_what_did(folder):
     """A soft chamber balloons far below the pressure asked for."""
-    (folder / "soft.toml").write_text(changed(DESIGN, "mu_MPa = 0.3", "mu_MPa = 0.05").replace("chambers = 2", "chambers = 1"))
+    (folder / "soft.toml").write_text(
+        changed(DESIGN, "mu_MPa = 0.3", "mu_MPa = 0.05").replace("chambers = 2", "chambers = 1")
+    )
     arguments = ["solve", "soft.toml", "--mesh-size-mm", "8", "--pressure-kPa", "200", "-o", "out"]
     done = subprocess.run([PNEUNET, *arguments], capture_output=True, text=True, timeout=300)
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
@@ -272,23 +317,43 @@ wall_mm = [1, 1.2]
 """
 STUDIES = {
     "no kind": ('kind = "cell"\n', "", "key 'kind' is missing: write 'cell', 'segment' or 'manipulator'"),
-    "kind": ('kind = "cell"', 'kind = "cells"', "kind = 'cells' is not known: write 'cell', 'segment' or 'manipulator'"),
+    "kind": (
+        'kind = "cell"',
+        'kind = "cells"',
+        "kind = 'cells' is not known: write 'cell', 'segment' or 'manipulator'",
+    ),
     "no base": ("[base", "[bass", "key 'base' is missing: write the body as [base], or base = \"FILE.toml\""),
     "unknown key": ("[grid]", "[gird]", "unknown key 'gird': did you mean 'grid'?"),
     "body without a key": ("pressure_kPa = 10\n", "", "key 'pressure_kPa' is missing"),
     "body's unknown key": ("pressure_kPa = 10", "pressure_kPa = 10\nmesh_mm = 3", "'mesh_mm'"),
-    "nothing varied": ("[grid]\nwall_mm = [1, 1.2]", "", "nothing is varied: write [grid] with key = [values], or [[case]] tables"),
+    "nothing varied": (
+        "[grid]\nwall_mm = [1, 1.2]",
+        "",
+        "nothing is varied: write [grid] with key = [values], or [[case]] tables",
+    ),
     "unknown variable": ("wall_mm", "wal_mm", "[grid]: unknown key 'wal_mm': did you mean 'wall_mm'?"),
     "variable's unit": ("wall_mm", "wall_m", "[grid]: key 'wall_m' has the wrong unit: write 'wall_mm'"),
     "one value": ("[1, 1.2]", "1.2", "wall_mm = 1.2 must be a list of values: write wall_mm = [1.2, ...]"),
     "no value": ("[1, 1.2]", "[]", "wall_mm = [] must be a list of values"),
     "path": ("wall_mm", "segment.2.wall_mm", "'segment.2.wall_mm' leads nowhere in the body"),
-    "unknown silicone": ("wall_mm = [1, 1.2]", 'silicone = ["Ecoflex"]', "silicone = 'Ecoflex' is not in the table"),
-    "listed case that is no body": ("[grid]\nwall_mm = [1, 1.2]", "[[case]]\nwall_mm = 1\n[[case]]\nwall_mm = -1", "wall_mm = -1 must be"),
+    "unknown silicone": (
+        "wall_mm = [1, 1.2]",
+        'silicone = ["Ecoflex"]',
+        "silicone = 'Ecoflex' is not in the table",
+    ),
+    "listed case that is no body": (
+        "[grid]\nwall_mm = [1, 1.2]",
+        "[[case]]\nwall_mm = 1\n[[case]]\nwall_mm = -1",
+        "wall_mm = -1 must be",
+    ),
     "listed twice": ("[grid]", "[[case]]\nwall_mm = 1\n[grid]", "'wall_mm' is in the list of cases too"),
     "no valid body": ("[1, 1.2]", "[-1, 0]", "wall_mm = -1 must be larger than 0"),
     "levels": ("levels = 1", "levels = 0", "levels = 0 must lie in 1..1000"),
-    "limit": ("[grid]", "[limits]\nmemory_GB = 2\n[grid]", "[limits]: key 'memory_GB' has the wrong unit: write 'memory_MB'"),
+    "limit": (
+        "[grid]",
+        "[limits]\nmemory_GB = 2\n[grid]",
+        "[limits]: key 'memory_GB' has the wrong unit: write 'memory_MB'",
+    ),
     "limit's value": ("[grid]", "[limits]\ntime_s = 0\n[grid]", "time_s = 0 must be larger than 0"),
     "two segments": ("[base.segment]", "[[base.segment]]", "a cell has one segment"),
 }
@@ -314,11 +379,19 @@ CELLS = {
     "no pressure": ("pressure_kPa = 10\n", "", "'pressure_kPa' is missing"),
     "control": ("levels = 2", "control = 'force'", "write 'pressure' or 'volume'"),
     "contact": ("levels = 2", "contact = 'glue'", "write 'auto', 'third-medium' or 'none'"),
-    "contact and volume": ("levels = 2", "control = 'volume'\ncontact = 'third-medium'", "goes with control = 'pressure'"),
+    "contact and volume": (
+        "levels = 2",
+        "control = 'volume'\ncontact = 'third-medium'",
+        "goes with control = 'pressure'",
+    ),
     "levels": ("levels = 2", "levels = 2.5", "'levels' must be a whole number"),
     "mesh": ("mesh_size_mm = 3", "mesh_size_mm = 0", "mesh_size_mm = 0 must lie in 0.1..20"),
     "held": ("angle_deg = 60", "angle_deg = 60\n[held]\nk1 = 0.1", "k1_per_mm"),
-    "held and volume": ("levels = 2", "control = 'volume'\n[held]\nk1_per_mm = 0.1", "go with control = 'pressure'"),
+    "held and volume": (
+        "levels = 2",
+        "control = 'volume'\n[held]\nk1_per_mm = 0.1",
+        "go with control = 'pressure'",
+    ),
 }
 
 

@@ -27,7 +27,16 @@ slopes = true
 
 def campaign(ranks, folder, designs, output="out", *options):
     (folder / "campaign.toml").write_text(CAMPAIGN.format(designs=designs))
-    command = [sys.executable, "-m", "pneunet", "campaign", str(folder / "campaign.toml"), "-o", str(folder / output), *options]
+    command = [
+        sys.executable,
+        "-m",
+        "pneunet",
+        "campaign",
+        str(folder / "campaign.toml"),
+        "-o",
+        str(folder / output),
+        *options,
+    ]
     line = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), "--", *command]
     done = subprocess.run(line, capture_output=True, text=True, timeout=300, cwd=ROOT)
     assert done.returncode == 0, done.stderr
@@ -49,18 +58,23 @@ def test_a_campaign_grows_and_its_states_are_those_of_one_potential(tmp_path):
     text, again = campaign(1, tmp_path, 2, "other", "--extend", str(tmp_path / "out" / "cells.npz"))
     assert "2 of them are taken over" in text
     for f in columns():
-        assert np.array_equal(getattr(again, f.name), getattr(data, f.name), equal_nan=f.metadata["type"] == "f4"), f.name
+        assert np.array_equal(
+            getattr(again, f.name), getattr(data, f.name), equal_nan=f.metadata["type"] == "f4"
+        ), f.name
     for row in (0, 1):
         free = np.flatnonzero((data.case == row) & ~data.prescribed)
         held = np.flatnonzero((data.case == row) & data.prescribed)
         assert data.pressure[free] == pytest.approx([0, 0.05, 0.1]) and len(held) == 2
         assert np.abs(data.forces[free]).max() < 1e-6 < 1e-3 < np.linalg.norm(data.forces[held], axis=1).min()
-        # forces are the potential's slope: from the free state they are the mean of the two stiffnesses, to second order
+        # forces are the potential's slope: from the free state they are the mean of the two stiffnesses, to
+        # second order
         for i in held:
             start = free[np.argmin(np.abs(data.pressure[free] - data.pressure[i]))]
             change = data.strains[i] - data.strains[start]
             mean = (data.matrices[i] + data.matrices[start]) / 2
-            assert data.forces[i] == pytest.approx(mean @ change, abs=0.05 * float(np.linalg.norm(data.forces[i])))
+            assert data.forces[i] == pytest.approx(
+                mean @ change, abs=0.05 * float(np.linalg.norm(data.forces[i]))
+            )
 
 
 def test_designs_that_are_suggested_can_be_further_ones(tmp_path, capsys):
@@ -72,6 +86,9 @@ def test_designs_that_are_suggested_can_be_further_ones(tmp_path, capsys):
     path.write_text("designs = 3\nkinds = ['twisting']\n" + lines)
     further = [d for d in read_campaign(path).designs if d.index >= 3]
     assert len(further) == 2 and not any(d.held_out for d in further)
-    for more, message in ((["--law", "analytic"], "--law analytic does not know it"), (["--of", "3"], "on offer: offer more")):
+    for more, message in (
+        (["--law", "analytic"], "--law analytic does not know it"),
+        (["--of", "3"], "on offer: offer more"),
+    ):
         assert main([*line, *more]) == 2
         assert message in capsys.readouterr().err

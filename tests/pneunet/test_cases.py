@@ -1,4 +1,5 @@
-"""The engine of studies and campaigns, with cases that really crash, hang and eat memory, on one, two and three ranks."""
+"""The engine of studies and campaigns, with cases that really crash, hang and eat memory, on one, two and
+three ranks."""
 
 import json
 import os
@@ -59,7 +60,9 @@ def test_every_way_to_end_is_recorded_and_stops_no_other_case(tmp_path, ranks):
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_a_killed_run_goes_on_where_it_was(tmp_path, ranks):
     directory, journal = tmp_path / "cases", tmp_path / "cases.journal"
-    process = subprocess.Popen(command(ranks, directory, "naps"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT)
+    process = subprocess.Popen(
+        command(ranks, directory, "naps"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT
+    )
     deadline = time.monotonic() + 60
     while len(list(directory.glob("*/record.json"))) < 3 and time.monotonic() < deadline:
         time.sleep(0.01)
@@ -68,8 +71,11 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path, ranks):
     finished = {p: p.stat().st_mtime_ns for p in directory.glob("[!.]*/record.json")}
     assert 3 <= len(finished) < 8
     progress, records = run(ranks, directory, "naps")
-    assert [r["inputs"]["x"] for r in records] == list(range(8)) and {r["status"] for r in records} == {"done"}
-    assert progress[0].startswith(f"{len(finished)} of 8 cases are finished") or ranks > 1  # a rank may finish one more
+    assert [r["inputs"]["x"] for r in records] == list(range(8)) and {r["status"] for r in records} == {
+        "done"
+    }
+    # a rank may finish one more
+    assert progress[0].startswith(f"{len(finished)} of 8 cases are finished") or ranks > 1
     assert all(p.stat().st_mtime_ns == at for p, at in finished.items())
     begun = journal.read_text().split()
     assert all(begun.count(str(json.loads(p.read_text())["inputs"]["x"])) == 1 for p in finished)
@@ -80,7 +86,9 @@ def test_failures_are_computed_again_when_asked(tmp_path):
     directory = tmp_path / "cases"
     run(1, directory, "failures")
     again, _ = run(1, directory, "failures")
-    assert again == [f"4 of 4 cases are finished in {directory}, 2 of them failed (--retry computes those again)"]
+    assert again == [
+        f"4 of 4 cases are finished in {directory}, 2 of them failed (--retry computes those again)"
+    ]
     progress, _ = run(1, directory, "failures", "--retry")
     assert len([line for line in progress if "ETA" in line]) == 2
 
@@ -91,7 +99,9 @@ def test_two_runs_do_not_work_in_one_folder(tmp_path):
         while not list(tmp_path.glob("cases/.*-*")):
             time.sleep(0.01)
         process.send_signal(signal.SIGSTOP)  # it holds the lock for as long as it lives
-        refused = subprocess.run(command(1, tmp_path / "cases", "none"), capture_output=True, text=True, timeout=60, cwd=ROOT)
+        refused = subprocess.run(
+            command(1, tmp_path / "cases", "none"), capture_output=True, text=True, timeout=60, cwd=ROOT
+        )
     finally:
         process.kill()
         process.wait()
@@ -107,4 +117,7 @@ def test_a_cache_serves_one_at_a_time_and_forgets_half_a_module(tmp_path, monkey
             (first / "fenics" / name).touch()
     with own_cache() as again:
         assert again == first
-        assert sorted(p.name for p in (first / "fenics").iterdir()) == ["libffcx_forms_whole.c", "libffcx_forms_whole.c.cached"]
+        assert sorted(p.name for p in (first / "fenics").iterdir()) == [
+            "libffcx_forms_whole.c",
+            "libffcx_forms_whole.c.cached",
+        ]

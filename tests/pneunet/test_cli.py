@@ -1,4 +1,5 @@
-"""The chain as a user types it, in a folder of its own with spaces in its name: outputs are there and agree."""
+"""The chain as a user types it, in a folder of its own with spaces in its name: outputs are there and
+agree."""
 
 import csv
 import json
@@ -32,13 +33,39 @@ length_mm = 25.0
 """
 COMMANDS = ("design", "shape", "mesh", "solve", "report", "fit-material", "run", "doctor")
 STEPS = [
-    "step", "pressure_kPa", "iterations", "factorisations", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm",
-    "smallest_wall_distance_mm", "walls_overlap", "body_distance_mm", "body_overlap", "contact_force_N", "largest_stretch",
-    "unstable_directions", "dead_load_fraction", "stability_factorisations", "seconds",
-]  # fmt: skip
+    "step",
+    "pressure_kPa",
+    "iterations",
+    "factorisations",
+    "volume_mm3",
+    "tip_x_mm",
+    "tip_y_mm",
+    "tip_z_mm",
+    "smallest_wall_distance_mm",
+    "walls_overlap",
+    "body_distance_mm",
+    "body_overlap",
+    "contact_force_N",
+    "largest_stretch",
+    "unstable_directions",
+    "dead_load_fraction",
+    "stability_factorisations",
+    "seconds",
+]
 MARKS = ["walls_overlap", "body_overlap"]
 CENTRELINES = ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm", *MARKS]
-SEGMENTS = ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm", *MARKS]
+SEGMENTS = [
+    "step",
+    "pressure_kPa",
+    "segment",
+    "e1",
+    "e2",
+    "e3",
+    "k1_rad_per_mm",
+    "k2_per_mm",
+    "k3_per_mm",
+    *MARKS,
+]
 
 
 def pneunet(*arguments, cwd):
@@ -171,7 +198,8 @@ def test_tables_of_a_solve_agree_with_each_other(folder):
     assert len(walls) == manipulator.chambers - 1
     assert min(float(w["distance_mm"]) for w in walls) == pytest.approx(steps[-1, 8])
     assert steps[0, 8] == pytest.approx(manipulator.segments[0].gap)
-    assert not steps[:, [9, 11]].any() and not lines[:, -2:].any() and not segments[:, -2:].any()  # nothing overlaps
+    # nothing overlaps
+    assert not steps[:, [9, 11]].any() and not lines[:, -2:].any() and not segments[:, -2:].any()
 
 
 def test_record_of_a_solve_is_complete(folder):
@@ -202,7 +230,9 @@ def test_paraview_files_hold_the_fields(folder):
     assert (grid.points + u)[on_tip].mean(axis=0) == pytest.approx(steps[-1, 5:8], abs=0.3)
     assert 1.0 < grid["stretch"].max() <= steps[-1, STEPS.index("largest_stretch")]
     distance = grid["wall_distance_mm"]
-    assert np.nanmin(distance) == pytest.approx(steps[-1, 8]) and 0 < np.isfinite(distance).sum() < 0.5 * len(distance)
+    assert np.nanmin(distance) == pytest.approx(steps[-1, 8]) and 0 < np.isfinite(distance).sum() < 0.5 * len(
+        distance
+    )
     assert abs(grid["pressure"]).max() > 0.005
     assert grid.n_points > 0 and (grid.celltypes == pyvista.CellType.QUADRATIC_TETRA).all()
     rest = pyvista.read(out / listed[0].get("file"))
@@ -210,7 +240,16 @@ def test_paraview_files_hold_the_fields(folder):
 
 
 def test_two_ranks_give_the_same_result(folder):
-    arguments = ["solve", "run 1/design.toml", "--mesh-size-mm", "4", "--pressure-kPa", "10", "-o", "two ranks"]
+    arguments = [
+        "solve",
+        "run 1/design.toml",
+        "--mesh-size-mm",
+        "4",
+        "--pressure-kPa",
+        "10",
+        "-o",
+        "two ranks",
+    ]
     told = pneunet("run", "-n", "2", *arguments, cwd=folder)
     assert "2 ranks" in told and told.count("done: 10 kPa") == 1
     one, two = folder / "run 1" / "solve", folder / "two ranks" / "solve"
@@ -224,7 +263,18 @@ def test_two_ranks_give_the_same_result(folder):
 
 def test_solve_without_fields_writes_tables_alone(folder, tmp_path):
     design = folder / "run 1" / "design.toml"
-    pneunet("solve", design, "--mesh-size-mm", "4", "--pressure-kPa", "1", "--no-fields", "-o", tmp_path, cwd=tmp_path)
+    pneunet(
+        "solve",
+        design,
+        "--mesh-size-mm",
+        "4",
+        "--pressure-kPa",
+        "1",
+        "--no-fields",
+        "-o",
+        tmp_path,
+        cwd=tmp_path,
+    )
     names = {"steps.csv", "centrelines.csv", "segments.csv", "walls.csv", "run.json", "checkpoint.npz"}
     assert {p.name for p in (tmp_path / "solve").iterdir()} == names
 
@@ -243,8 +293,13 @@ def test_report_shows_target_prediction_and_solution(folder):
 def test_fit_material_as_typed(tmp_path):
     """neo-Hookean data of 0.2 MPa: nominal stress 0.2 (l - 1/l^2)."""
     l = np.linspace(1.05, 2.0, 20)
-    np.savetxt(tmp_path / "pull.csv", np.column_stack([100 * (l - 1), 200 * (l - l**-2)]), delimiter=",", comments="",
-               header="strain_percent,stress_kPa")  # fmt: skip
+    np.savetxt(
+        tmp_path / "pull.csv",
+        np.column_stack([100 * (l - 1), 200 * (l - l**-2)]),
+        delimiter=",",
+        comments="",
+        header="strain_percent,stress_kPa",
+    )
     told = pneunet("fit-material", "pull.csv", "--law", "neo-hookean", cwd=tmp_path)
     assert "mu_MPa = 0.2" in told and "warning: uniaxial data alone" in told
     out = tmp_path / "out" / "fit-pull"

@@ -37,7 +37,9 @@ def test_a_python_without_the_libraries_is_told_what_to_type(tmp_path, monkeypat
 
 
 def test_reference_blas_is_advised_against(monkeypatch):
-    monkeypatch.setattr(doctor, "probe", lambda code: (True, "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0"))
+    monkeypatch.setattr(
+        doctor, "probe", lambda code: (True, "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0")
+    )
     finding = doctor.check_blas()
     assert not finding.ok and "libopenblas0-serial" in finding.fix
 

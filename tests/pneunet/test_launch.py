@@ -14,7 +14,9 @@ SIZE = "from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.r
 def run(ranks, *command, **options):
     """launch.run in a process of its own, since it hands its standard streams on."""
     code = f"import sys; from pneunet import launch; sys.exit(launch.run({ranks}, sys.argv[1:]))"
-    return subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True, timeout=120, **options)
+    return subprocess.run(
+        [sys.executable, "-c", code, *command], capture_output=True, text=True, timeout=120, **options
+    )
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 5])
@@ -62,8 +64,13 @@ def test_without_dashes_it_is_a_subcommand_of_pneunet():
 
 
 def test_started_from_within_an_mpi_rank():
-    inner = f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {SIZE!r}]))"
-    outer = f"import subprocess, sys; from mpi4py import MPI; subprocess.run([sys.executable, '-c', {inner!r}], check=True)"
+    inner = (
+        f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {SIZE!r}]))"
+    )
+    outer = (
+        f"import subprocess, sys; from mpi4py import MPI; subprocess.run([sys.executable, '-c', {inner!r}],"
+        " check=True)"
+    )
     done = run(1, "--", "python", "-c", outer)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["2", "1"]
@@ -79,7 +86,9 @@ def test_one_thread_a_rank_unless_the_user_says_otherwise(monkeypatch):
 def test_terminating_it_leaves_no_ranks_behind(tmp_path):
     beat = tmp_path / "beat"
     ranks = f"import time\nwhile True: open({str(beat)!r}, 'a').write('x'); time.sleep(0.05)"
-    code = f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {ranks!r}]))"
+    code = (
+        f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {ranks!r}]))"
+    )
     process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 60
     while not beat.exists() and time.monotonic() < deadline:

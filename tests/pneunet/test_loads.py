@@ -22,7 +22,15 @@ wall_mm = 0.5
 top_wall_mm = 0.5
 side_wall_mm = 0.5
 """
-COLUMNS = ["pressure_kPa", "volume_mm3", "tip_x_mm", "tip_y_mm", "tip_z_mm", "dead_load_fraction", "unstable_directions"]
+COLUMNS = [
+    "pressure_kPa",
+    "volume_mm3",
+    "tip_x_mm",
+    "tip_y_mm",
+    "tip_z_mm",
+    "dead_load_fraction",
+    "unstable_directions",
+]
 
 
 def solve(folder, top, *options, tables="", exit_code=0):
@@ -30,14 +38,21 @@ def solve(folder, top, *options, tables="", exit_code=0):
     folder.mkdir(exist_ok=True)
     (folder / "design.toml").write_text(top + "\n" + BODY + tables)
     assert main(["solve", str(folder / "design.toml"), "--no-fields", *options]) == exit_code
-    return read_columns(folder / "solve" / "steps.csv", COLUMNS), json.loads((folder / "solve" / "run.json").read_text())
+    return read_columns(folder / "solve" / "steps.csv", COLUMNS), json.loads(
+        (folder / "solve" / "run.json").read_text()
+    )
 
 
 def test_dead_loads_come_first_then_pressure(tmp_path, capsys):
-    """Weight along the target's -x is along the body's y when the base is turned about z; resumed without pressure, then with."""
-    loads = "[loads]\ngravity_m_per_s2 = [-98.1, 0, 0]\n[base]\nrotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]\n"
+    """Weight along the target's -x is along the body's y when the base is turned about z; resumed without
+    pressure, then with."""
+    loads = (
+        "[loads]\ngravity_m_per_s2 = [-98.1, 0, 0]\n[base]\nrotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]\n"
+    )
     hanging, record = solve(tmp_path, "pressure_kPa = 0", tables=loads)
-    assert record["status"] == "reached the loads asked for" and record["loads"] == {"gravity_m_per_s2": [-98.1, 0.0, 0.0]}
+    assert record["status"] == "reached the loads asked for" and record["loads"] == {
+        "gravity_m_per_s2": [-98.1, 0.0, 0.0]
+    }
     assert hanging[0, 5] == 0.0 and hanging[-1, 5] == 1.0 and (hanging[:, 0] == 0.0).all()
     moved = hanging[-1, 2:5] - hanging[0, 2:5]
     assert moved[1] > 0.02 and abs(moved[[0, 2]]).max() < 0.1 * moved[1]
@@ -63,7 +78,11 @@ def ballooned(tmp_path_factory):
 def test_volume_control_passes_and_names_the_limit_point(ballooned):
     _, steps, record = ballooned
     pressure, volume = steps[:, 0], steps[:, 1]
-    assert volume[-1] == pytest.approx(8 * volume[0]) and record["control"] == "volume" and record["volume_factor"] == 8.0
+    assert (
+        volume[-1] == pytest.approx(8 * volume[0])
+        and record["control"] == "volume"
+        and record["volume_factor"] == 8.0
+    )
     [limit] = record["limit_points"]
     top = pressure.argmax()
     assert 0 < top < len(steps) - 1 and limit["kind"] == "maximum"
@@ -76,9 +95,13 @@ def test_arc_length_walks_the_same_curve_and_pressure_stops_below_it(ballooned, 
     _, steps, record = ballooned
     [limit] = record["limit_points"]
     arc, again = solve(tmp_path / "arc", 'pressure_kPa = 60\ncontrol = "arc length"\narc_length_mm = 3')
-    assert arc[-1, 1] > limit["volume_mm3"] and again["limit_points"][0]["pressure_kPa"] == pytest.approx(limit["pressure_kPa"], rel=5e-3)
+    assert arc[-1, 1] > limit["volume_mm3"] and again["limit_points"][0]["pressure_kPa"] == pytest.approx(
+        limit["pressure_kPa"], rel=5e-3
+    )
     inside = arc[:, 1] < steps[-1, 1]
-    assert arc[inside, 0] == pytest.approx(np.interp(arc[inside, 1], steps[:, 1], steps[:, 0]), abs=0.03 * limit["pressure_kPa"])
+    assert arc[inside, 0] == pytest.approx(
+        np.interp(arc[inside, 1], steps[:, 1], steps[:, 0]), abs=0.03 * limit["pressure_kPa"]
+    )
     capsys.readouterr()
     stopped, _ = solve(tmp_path / "pressure", "pressure_kPa = 60", exit_code=2)
     error = capsys.readouterr().err
@@ -100,7 +123,12 @@ checkpoint.save = last
 main(sys.argv[1:])"""
     (tmp_path / "design.toml").write_text((folder / "design.toml").read_text())
     command = ["solve", str(tmp_path / "design.toml"), "--no-fields"]
-    assert subprocess.run([sys.executable, "-c", code, *command], stdout=subprocess.DEVNULL, timeout=100).returncode == -9
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code, *command], stdout=subprocess.DEVNULL, timeout=100
+        ).returncode
+        == -9
+    )
     assert len(read_columns(tmp_path / "solve" / "steps.csv", COLUMNS)) < len(steps)
     assert main([*command, "--resume"]) == 0
     assert read_columns(tmp_path / "solve" / "steps.csv", COLUMNS) == pytest.approx(steps, rel=1e-8, abs=1e-7)
@@ -112,8 +140,12 @@ def test_what_is_measured_at_the_end_is_recorded_and_not_twice(tmp_path, capsys)
     measure = "[measure]\ntip_stiffness = true\nblocked_force = true\n"
     solve(tmp_path, "pressure_kPa = 1")
     _, record = solve(tmp_path, "pressure_kPa = 1", "--resume", tables=measure)
-    assert np.shape(record["tip_stiffness"]["matrix"]) == (6, 6) and record["tip_stiffness"]["pressure_kPa"] == pytest.approx(1.0)
-    assert len(record["blocked_force"]["force_N"]) == 3 and record["blocked_force"]["pressure_kPa"] == pytest.approx(1.0)
+    assert np.shape(record["tip_stiffness"]["matrix"]) == (6, 6) and record["tip_stiffness"][
+        "pressure_kPa"
+    ] == pytest.approx(1.0)
+    assert len(record["blocked_force"]["force_N"]) == 3 and record["blocked_force"][
+        "pressure_kPa"
+    ] == pytest.approx(1.0)
     assert record["status"] == "reached the pressure asked for"
     capsys.readouterr()
     solve(tmp_path, "pressure_kPa = 1", "--resume", tables=measure)
@@ -121,14 +153,46 @@ def test_what_is_measured_at_the_end_is_recorded_and_not_twice(tmp_path, capsys)
 
 
 BAD = {
-    "gravity's unit": ("pressure_kPa = 1", "[loads]\ngravity = [0, 0, 1]", "key 'gravity' has the wrong unit: write 'gravity_m_per_s2'"),
-    "not a vector": ("pressure_kPa = 1", "[loads]\ntip_force_N = 3", "[loads]: 'tip_force_N' must be three numbers, [x, y, z], not 3"),
-    "not a number": ("pressure_kPa = 1", "[loads]\ntip_moment_N_mm = [0, 0, nan]", "[loads]: 'tip_moment_N_mm' must be a finite number"),
-    "nothing to do": ("pressure_kPa = 0", "[loads]\ntip_force_N = [0, 0, 0]", "pressure_kPa = 0 leaves nothing to solve"),
-    "control": ('pressure_kPa = 1\ncontrol = "flow"', "", "control = 'flow' is not known: write 'pressure', 'volume' or 'arc length'"),
-    "factor": ('pressure_kPa = 1\ncontrol = "volume"\nvolume_factor = 0.5', "", "volume_factor = 0.5 must lie in 1.001..100"),
-    "another control's key": ("pressure_kPa = 1\nvolume_factor = 3", "", 'volume_factor goes with control = "volume"'),
-    "measure": ("pressure_kPa = 1", "[measure]\nblocked_force = 1", "[measure]: 'blocked_force' must be true or false, not 1"),
+    "gravity's unit": (
+        "pressure_kPa = 1",
+        "[loads]\ngravity = [0, 0, 1]",
+        "key 'gravity' has the wrong unit: write 'gravity_m_per_s2'",
+    ),
+    "not a vector": (
+        "pressure_kPa = 1",
+        "[loads]\ntip_force_N = 3",
+        "[loads]: 'tip_force_N' must be three numbers, [x, y, z], not 3",
+    ),
+    "not a number": (
+        "pressure_kPa = 1",
+        "[loads]\ntip_moment_N_mm = [0, 0, nan]",
+        "[loads]: 'tip_moment_N_mm' must be a finite number",
+    ),
+    "nothing to do": (
+        "pressure_kPa = 0",
+        "[loads]\ntip_force_N = [0, 0, 0]",
+        "pressure_kPa = 0 leaves nothing to solve",
+    ),
+    "control": (
+        'pressure_kPa = 1\ncontrol = "flow"',
+        "",
+        "control = 'flow' is not known: write 'pressure', 'volume' or 'arc length'",
+    ),
+    "factor": (
+        'pressure_kPa = 1\ncontrol = "volume"\nvolume_factor = 0.5',
+        "",
+        "volume_factor = 0.5 must lie in 1.001..100",
+    ),
+    "another control's key": (
+        "pressure_kPa = 1\nvolume_factor = 3",
+        "",
+        'volume_factor goes with control = "volume"',
+    ),
+    "measure": (
+        "pressure_kPa = 1",
+        "[measure]\nblocked_force = 1",
+        "[measure]: 'blocked_force' must be true or false, not 1",
+    ),
     "measure what": ("pressure_kPa = 1", "[measure]\nblockedforce = true", "did you mean 'blocked_force'?"),
 }
 

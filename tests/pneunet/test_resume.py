@@ -1,4 +1,5 @@
-"""`pneunet solve --resume` after real kills, on one and two ranks, and what happens when nothing more can be written."""
+"""`pneunet solve --resume` after real kills, on one and two ranks, and what happens when nothing more can be
+written."""
 
 import os
 import shutil
@@ -16,21 +17,32 @@ from base.files import read_columns
 from tests.reference_case import DATA
 
 SOLVE = ["solve", str(DATA / "reference.toml"), "--pressure-kPa", "35"]
-#: pneunet with so many bytes a file may have, writing more fails as on a full disk; MPI's own files come before
+#: pneunet with so many bytes a file may have, writing more fails as on a full disk; MPI's own files come
+#: before
 LIMITED = """import resource, sys
 from mpi4py import MPI
 from pneunet.cli import main
 resource.setrlimit(resource.RLIMIT_FSIZE, 2 * (int(sys.argv[1]),))
 sys.exit(main(sys.argv[2:]))"""
 TABLES = {
-    "steps.csv": "step pressure_kPa volume_mm3 tip_x_mm tip_y_mm tip_z_mm largest_stretch smallest_wall_distance_mm".split(),
+    "steps.csv": (
+        "step pressure_kPa volume_mm3 tip_x_mm tip_y_mm tip_z_mm".split()
+        + ["largest_stretch", "smallest_wall_distance_mm"]
+    ),
     "centrelines.csv": "step pressure_kPa s_mm x_mm y_mm z_mm".split(),
     "segments.csv": "step pressure_kPa segment e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(),
 }
 
 
 def solve(folder, *options, ranks=1, limit=None):
-    command = [sys.executable, *(["-c", LIMITED, str(limit)] if limit else ["-m", "pneunet"]), *SOLVE, "-o", str(folder), *options]
+    command = [
+        sys.executable,
+        *(["-c", LIMITED, str(limit)] if limit else ["-m", "pneunet"]),
+        *SOLVE,
+        "-o",
+        str(folder),
+        *options,
+    ]
     if ranks > 1:
         command = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), "--", *command]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=DATA.parent.parent)
@@ -79,11 +91,14 @@ def killed(tmp_path_factory, whole):
 
 
 def ranks_of(launcher):
-    """Process ids of the ranks that a running `pneunet run` (a pid) has started: the children of its mpirun."""
+    """Process ids of the ranks that a running `pneunet run` (a pid) has started: the children of its
+    mpirun."""
     parents = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
-            parents.setdefault(int(stat.read_text().rsplit(")", 1)[1].split()[1]), []).append(int(stat.parent.name))
+            parents.setdefault(int(stat.read_text().rsplit(")", 1)[1].split()[1]), []).append(
+                int(stat.parent.name)
+            )
         except (OSError, ValueError):
             continue  # ended just now
     return sorted(rank for mpirun in parents.get(launcher, []) for rank in parents.get(mpirun, []))
@@ -92,8 +107,24 @@ def ranks_of(launcher):
 @pytest.mark.parametrize("which", [0, 1])
 def test_a_rank_that_dies_ends_the_run_and_the_next_goes_on(whole, tmp_path, which):
     shutil.copytree(whole / "mesh", tmp_path / "mesh")
-    command = [sys.executable, "-m", "pneunet", "run", "-n", "2", "--", sys.executable, "-m", "pneunet", *SOLVE, "-o", str(tmp_path)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=DATA.parent.parent)
+    command = [
+        sys.executable,
+        "-m",
+        "pneunet",
+        "run",
+        "-n",
+        "2",
+        "--",
+        sys.executable,
+        "-m",
+        "pneunet",
+        *SOLVE,
+        "-o",
+        str(tmp_path),
+    ]
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=DATA.parent.parent
+    )
     deadline = time.monotonic() + 120
     while reached(tmp_path) < 2 and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
@@ -101,7 +132,11 @@ def test_a_rank_that_dies_ends_the_run_and_the_next_goes_on(whole, tmp_path, whi
     told = process.communicate(timeout=30)[1]  # no deadlock
     assert process.returncode == 137
     last = told.splitlines()[-1]  # Open MPI 5 frames a notice of its own before it
-    assert "a rank was stopped by signal 9" in last and "--resume goes on" in last and len(told.splitlines()) <= 6
+    assert (
+        "a rank was stopped by signal 9" in last
+        and "--resume goes on" in last
+        and len(told.splitlines()) <= 6
+    )
     assert 2 <= reached(tmp_path) < reached(whole)
     done = solve(tmp_path, "--resume", ranks=2)
     assert done.returncode == 0, done.stderr
@@ -124,7 +159,10 @@ def test_a_killed_run_ends_at_the_same_result(whole, killed, tmp_path, ranks):
         assert b == pytest.approx(a, rel=1e-8, abs=1e-8), name
     with np.load(whole / "solve" / "checkpoint.npz") as a, np.load(folder / "solve" / "checkpoint.npz") as b:
         last = len(a["parameter"]) - 1
-        assert abs(a["displacement_mm"][last] - b["displacement_mm"][last]).max() < 1e-8 * abs(a["displacement_mm"][last]).max()
+        assert (
+            abs(a["displacement_mm"][last] - b["displacement_mm"][last]).max()
+            < 1e-8 * abs(a["displacement_mm"][last]).max()
+        )
     assert readable(folder) == pytest.approx(readable(whole))
 
 
@@ -133,18 +171,32 @@ def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):
     shutil.copytree(whole, folder)
     told = solve(folder, "--resume").stdout
     assert "complete" in told and "done" not in told
-    for options, message in ((["--mesh-size-mm", "4"], "add --mesh-size-mm 3"), (["--pressure-kPa", "5"], "has passed")):
+    for options, message in (
+        (["--mesh-size-mm", "4"], "add --mesh-size-mm 3"),
+        (["--pressure-kPa", "5"], "has passed"),
+    ):
         refused = solve(folder, "--resume", *options)
         assert refused.returncode == 2 and message in refused.stderr and len(refused.stderr.splitlines()) == 1
     (folder / "solve" / "checkpoint.npz").unlink()
-    assert "starting from the beginning" in solve(folder, "--resume", "--pressure-kPa", "1", "--no-fields").stdout
+    assert (
+        "starting from the beginning"
+        in solve(folder, "--resume", "--pressure-kPa", "1", "--no-fields").stdout
+    )
 
 
-@pytest.mark.parametrize(("ranks", "limit", "options"), [(1, 400_000, ["--no-fields"]), (2, 400_000, ["--no-fields"]), (2, 100_000, [])])
+@pytest.mark.parametrize(
+    ("ranks", "limit", "options"),
+    [(1, 400_000, ["--no-fields"]), (2, 400_000, ["--no-fields"]), (2, 100_000, [])],
+)
 def test_a_full_disk_ends_in_one_line(whole, tmp_path, ranks, limit, options):
-    """Files may grow to so many bytes: the tables' size is below both, a checkpoint above the first, a .vtu above the second."""
+    """Files may grow to so many bytes: the tables' size is below both, a checkpoint above the first, a .vtu
+    above the second."""
     shutil.copytree(whole / "mesh", tmp_path / "mesh")
     failed = solve(tmp_path, *options, ranks=ranks, limit=limit)
     assert failed.returncode == 2, failed.stdout + failed.stderr
-    assert failed.stderr.count("cannot be written to") == 1 and "--resume" in failed.stderr and "Traceback" not in failed.stderr
+    assert (
+        failed.stderr.count("cannot be written to") == 1
+        and "--resume" in failed.stderr
+        and "Traceback" not in failed.stderr
+    )
     assert not list((tmp_path / "solve").glob(".*"))

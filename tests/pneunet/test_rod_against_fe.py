@@ -1,4 +1,5 @@
-"""The rod with a unit cell's law against finite elements of a short finger, free and hanging, on meshes of the same size."""
+"""The rod with a unit cell's law against finite elements of a short finger, free and hanging, on meshes of
+the same size."""
 
 from dataclasses import replace
 
@@ -19,14 +20,23 @@ MESH_SIZE, PRESSURE = 2.0, 0.01
 
 @pytest.fixture(scope="module")
 def finger(tmp_path_factory):
-    folder, body = tmp_path_factory.mktemp("rod"), Manipulator((CASES["one_sided_w10"](angle=60.0, chambers=3),))
+    folder, body = (
+        tmp_path_factory.mktemp("rod"),
+        Manipulator((CASES["one_sided_w10"](angle=60.0, chambers=3),)),
+    )
     states = []
-    solve_cell(CellCase(replace(body.segments[0], chambers=1), PRESSURE, MESH_SIZE, 1), folder / "cell.msh", states.append)
+    solve_cell(
+        CellCase(replace(body.segments[0], chambers=1), PRESSURE, MESH_SIZE, 1),
+        folder / "cell.msh",
+        states.append,
+    )
     mesh_manipulator(body, MESH_SIZE, folder)
     return body, QuadraticLaw.of_states(states), folder / "manipulator.msh"
 
 
-@pytest.mark.parametrize("loads", [DeadLoads(), DeadLoads((0.0, 0.0, -3 * 9810.0))], ids=["free", "hanging at 3 g"])
+@pytest.mark.parametrize(
+    "loads", [DeadLoads(), DeadLoads((0.0, 0.0, -3 * 9810.0))], ids=["free", "hanging at 3 g"]
+)
 def test_tips_agree_and_end_effects_are_why(finger, loads):
     body, law, mesh = finger
     solve = ManipulatorSolve(body, mesh, loads=loads)

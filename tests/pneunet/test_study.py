@@ -64,14 +64,18 @@ def file(tmp_path):
 
 def test_cells_on_ranks_and_a_killed_study_goes_on(tmp_path, file):
     """On three ranks, killed after its first case; then on two; then there is nothing left to do for one."""
-    process = subprocess.Popen(command(3, file, tmp_path / "out"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT)
+    process = subprocess.Popen(
+        command(3, file, tmp_path / "out"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT
+    )
     deadline = time.monotonic() + 120
     while not list(tmp_path.glob("out/cases/*/record.json")) and time.monotonic() < deadline:
         time.sleep(0.01)
     process.kill()
     process.wait()
     text, rows = study(2, file, tmp_path / "out")
-    assert "4 cell cases over angle_deg, side_wall_mm; 1 at once" in text and "of 2 cases are finished" in text
+    assert (
+        "4 cell cases over angle_deg, side_wall_mm; 1 at once" in text and "of 2 cases are finished" in text
+    )
     assert [(row["angle_deg"], row["side_wall_mm"], row["status"], row["pressure_kPa"]) for row in rows] == [
         *(("60", "1", "done", p) for p in ("0", "5", "10")),
         ("60", "7", "refused", ""),
@@ -88,7 +92,12 @@ def test_cells_on_ranks_and_a_killed_study_goes_on(tmp_path, file):
     # the same numbers as the plain command's, from the file that the case left
     case = tmp_path / "out" / "cases" / slanted["case"]
     shutil.copy(case / "cell.toml", tmp_path)
-    subprocess.run([sys.executable, "-m", "pneunet", "cell", str(tmp_path / "cell.toml")], check=True, capture_output=True, cwd=ROOT)
+    subprocess.run(
+        [sys.executable, "-m", "pneunet", "cell", str(tmp_path / "cell.toml")],
+        check=True,
+        capture_output=True,
+        cwd=ROOT,
+    )
     with open(tmp_path / "cell" / "cell.csv", newline="") as stream:
         last = list(csv.DictReader(stream))[-1]
     for column in ("k1_rad_per_mm", "k2_per_mm", "volume_mm3", "largest_stretch"):
@@ -101,8 +110,16 @@ def test_segments_one_of_which_cannot_reach_its_pressure(tmp_path, file):
     good, stopped = ([row for row in rows if row["status"] == status] for status in ("done", "stopped"))
     assert numbers(good, "pressure_kPa") == [0, 5] and float(good[1]["tip_z_mm"]) < -0.1
     assert 0 < float(good[1]["smallest_wall_distance_mm"]) < 1
-    assert [good[1][name] for name in ("walls_overlap", "body_overlap", "first_touch_kPa", "warnings")] == ["0", "0", "", ""]
+    assert [good[1][name] for name in ("walls_overlap", "body_overlap", "first_touch_kPa", "warnings")] == [
+        "0",
+        "0",
+        "",
+        "",
+    ]
     assert {row["mu_MPa"] for row in good} == {"0.3"} and {row["mu_MPa"] for row in stopped} == {"0.001"}
     assert 0 < float(stopped[-1]["pressure_kPa"]) < 5  # how far it came
-    assert "was not reached" in stopped[0]["reason"] and f"cases/{stopped[0]['case']}/solve" in stopped[0]["reason"]
+    assert (
+        "was not reached" in stopped[0]["reason"]
+        and f"cases/{stopped[0]['case']}/solve" in stopped[0]["reason"]
+    )
     assert "1 done, 1 stopped" in text

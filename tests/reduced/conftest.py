@@ -3,7 +3,8 @@ import pytest
 
 
 def _assert_derivatives(function, x, step=1e-6, tolerance=1e-7):
-    """function(x) -> (value, gradient, Hessian) at x (n,): both derivatives agree with central differences."""
+    """function(x) -> (value, gradient, Hessian) at x (n,): both derivatives agree with central
+    differences."""
     _, gradient, hessian = function(x)
     pairs = [(function(x + d), function(x - d)) for d in step * np.eye(len(x))]
     slope = np.array([(a[0] - b[0]) / (2 * step) for a, b in pairs])

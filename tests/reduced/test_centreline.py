@@ -15,7 +15,9 @@ def test_bending_is_a_circle_towards_minus_z():
     angle = line.arc_length / radius
     expected = radius * np.stack([np.sin(angle), 0 * angle, np.cos(angle) - 1], axis=1)
     np.testing.assert_allclose(line.points, expected, atol=1e-11)
-    np.testing.assert_allclose(line.tangents, np.stack([np.cos(angle), 0 * angle, -np.sin(angle)], axis=1), atol=1e-11)
+    np.testing.assert_allclose(
+        line.tangents, np.stack([np.cos(angle), 0 * angle, -np.sin(angle)], axis=1), atol=1e-11
+    )
     assert line.length == pytest.approx(66.0)
 
 
@@ -37,7 +39,8 @@ def test_joints_are_the_papers_products_of_end_rotations():
     rng = np.random.default_rng(1)
     lengths = np.array([20.0, 7.0, 35.0])
     strains = RodStrains([1, 0, 0] + 0.05 * rng.standard_normal((3, 3)), 0.03 * rng.standard_normal((3, 3)))
-    # Eqs 24-26: every piece built on its own, turned by the product of the rotations before it, moved to their end
+    # Eqs 24-26: every piece built on its own, turned by the product of the rotations before it, moved to
+    # their end
     rotation, end, expected = np.eye(3), np.zeros(3), [np.zeros((1, 3))]
     for i, length in enumerate(lengths):
         s = length * np.arange(1, 5) / 4
@@ -65,7 +68,9 @@ def test_sampling_does_not_depend_on_the_spacing_and_moves_with_the_base():
 def test_many_designs_at_once_are_those_one_by_one():
     rng = np.random.default_rng(4)
     lengths = rng.uniform(5, 40, (7, 3))
-    strains = RodStrains([1, 0, 0] + 0.05 * rng.standard_normal((7, 3, 3)), 0.03 * rng.standard_normal((7, 3, 3)))
+    strains = RodStrains(
+        [1, 0, 0] + 0.05 * rng.standard_normal((7, 3, 3)), 0.03 * rng.standard_normal((7, 3, 3))
+    )
     base = se3.exp_pose(rng.standard_normal((7, 6)))
     s, poses = free_shapes(lengths, strains, 5, base)
     for i in range(7):

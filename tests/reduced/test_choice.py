@@ -21,5 +21,8 @@ def test_a_law_s_name_chooses_it_again():
 def test_the_shipped_law_knows_the_start_dimensions_of_both_kinds():
     law = shipped_law()
     assert set(law.kinds) == set(KINDS)
-    for kind, size in ((ONE_SIDED, {}), ("twisting", {"chamber_height": 5.5, "cavity_floor": 0.5, "gap": 2.0})):
+    for kind, size in (
+        (ONE_SIDED, {}),
+        ("twisting", {"chamber_height": 5.5, "cavity_floor": 0.5, "gap": 2.0}),
+    ):
         assert law.doubts(Segment(kind, 60.0, 5, **size), [0.01, 0.03]) == ()

@@ -10,7 +10,9 @@ from tests.cases import CASES
 
 def plate(short, long, thickness, modulus):
     material = SimpleNamespace(mu=modulus / 3)
-    return SimpleNamespace(chamber_height=short, cavity_width=long, sin=1.0, wall=thickness, material=material, gap=1.0)
+    return SimpleNamespace(
+        chamber_height=short, cavity_width=long, sin=1.0, wall=thickness, material=material, gap=1.0
+    )
 
 
 def test_small_deflection_is_timoshenko():
@@ -27,6 +29,7 @@ def test_large_deflection_is_roark_s(load, deflection):
 
 
 def test_known_contacts():
-    """The case that touches from 7 kPa on is expected to overlap well before 50 kPa, the one that stays open is not."""
+    """The case that touches from 7 kPa on is expected to overlap well before 50 kPa, the one that stays open
+    is not."""
     assert gap_left(CASES["twist_w15"](angle=60.0, chambers=3), 0.05) < 0
     assert gap_left(CASES["twist_w12"](angle=60.0, chambers=3), 0.05) > 0

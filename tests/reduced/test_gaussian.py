@@ -13,7 +13,10 @@ def observed(n, seed=0):
     rng = np.random.default_rng(seed)
     x = rng.uniform(-1, 1, (n, 2))
     group = np.repeat(np.arange(n // 3), 3)
-    y = np.column_stack([np.sin(2 * x[:, 0]) + x[:, 1], x[:, 0] * x[:, 1]]) + 1e-2 * rng.normal(size=(n // 3, 2))[group]
+    y = (
+        np.column_stack([np.sin(2 * x[:, 0]) + x[:, 1], x[:, 0] * x[:, 1]])
+        + 1e-2 * rng.normal(size=(n // 3, 2))[group]
+    )
     return x, y, group
 
 
@@ -25,7 +28,9 @@ def test_the_likelihood_has_its_gradient():
     data = [(y[:, :1], np.ones(39)), (y[:, 1:], doubt)]
     at, h = np.append(np.log([2.0, 1.0]), [0.3, -0.2, *np.log([1e-2, 5e-2, 3e-2])]), 1e-4
     ends = [[_misfit(at + s * h * e, x, data, same)[0] for s in (1, -1)] for e in np.eye(7)]
-    assert [(a - b) / (2 * h) for a, b in ends] == pytest.approx(_misfit(at, x, data, same)[1], rel=1e-5, abs=1e-4)
+    assert [(a - b) / (2 * h) for a, b in ends] == pytest.approx(
+        _misfit(at, x, data, same)[1], rel=1e-5, abs=1e-4
+    )
 
 
 def test_with_all_points_it_is_the_textbook_s_process():
@@ -44,7 +49,9 @@ def test_with_all_points_it_is_the_textbook_s_process():
     spread = np.diag(prior(new, new) - prior(new, z) @ inverse @ prior(z, new))
     inputs = new * process.width + process.shift
     assert process(inputs) == pytest.approx(mean, rel=1e-3)  # jitter, far outside
-    assert process.deviation(inputs) ** 2 / process.variance == pytest.approx(np.column_stack([spread, spread]), rel=5e-3, abs=1e-6)
+    assert process.deviation(inputs) ** 2 / process.variance == pytest.approx(
+        np.column_stack([spread, spread]), rel=5e-3, abs=1e-6
+    )
 
 
 def test_the_covariance_is_that_of_the_posterior():
@@ -53,9 +60,13 @@ def test_the_covariance_is_that_of_the_posterior():
     process = fit(x, y, group, like=replace(found, metric=np.diag([1.0, 0.5]), noise=1e-3, common_noise=1e-2))
     more = np.array([[0.3, -0.4], [0.9, 0.9], [-0.2, 0.7]])
     before = process.covariance(more)
-    assert np.sqrt(np.diag(before)[:, None] * process.variance) == pytest.approx(process.deviation(more), rel=1e-6)
+    assert np.sqrt(np.diag(before)[:, None] * process.variance) == pytest.approx(
+        process.deviation(more), rel=1e-6
+    )
     # what is not known after one more observation does not depend on what it says
-    after = fit(np.vstack([x, more[:1]]), np.vstack([y, [[5.0, -3.0]]]), np.append(group, 99), like=process).covariance(more)
+    after = fit(
+        np.vstack([x, more[:1]]), np.vstack([y, [[5.0, -3.0]]]), np.append(group, 99), like=process
+    ).covariance(more)
     told = np.outer(before[0], before[0]) / (before[0, 0] + process.noise + process.common_noise)
     assert after == pytest.approx(before - told, rel=1e-3, abs=1e-6)
 
@@ -63,7 +74,9 @@ def test_the_covariance_is_that_of_the_posterior():
 def test_slopes_are_followed_and_spare_observations():
     x, y, group = observed(12)
     at, ways = np.arange(12), np.random.default_rng(3).normal(size=(12, 2))
-    steep = np.column_stack([2 * np.cos(2 * x[:, 0]) * ways[:, 0] + ways[:, 1], x[:, 1] * ways[:, 0] + x[:, 0] * ways[:, 1]])
+    steep = np.column_stack(
+        [2 * np.cos(2 * x[:, 0]) * ways[:, 0] + ways[:, 1], x[:, 1] * ways[:, 0] + x[:, 0] * ways[:, 1]]
+    )
     process, without = fit(x, y, group, slopes=Slopes(at, ways, steep)), fit(x, y, group)
     _, found = process(x, derivative=True)
     assert np.einsum("npd,nd->np", found, ways) == pytest.approx(steep, abs=0.02)
@@ -81,7 +94,9 @@ def test_the_deviation_is_what_observations_and_slopes_leave_of_the_weights(monk
     slopes = Slopes(np.arange(12), np.random.default_rng(3).normal(size=(12, 2)), np.ones((12, 2)))
     found = fit(x, y, np.arange(12), slopes=slopes)
     noises = {"noise": 1e-3, "common_noise": 2e-3, "slope_noise": 5e-3}
-    process = fit(x, y, np.arange(12), slopes=slopes, like=replace(found, metric=np.diag([1.0, 0.5]), **noises))
+    process = fit(
+        x, y, np.arange(12), slopes=slopes, like=replace(found, metric=np.diag([1.0, 0.5]), **noises)
+    )
 
     def basis(z):
         kernel = np.exp(-0.5 * (((z[:, None] - process.inducing) @ process.metric) ** 2).sum(axis=2))
@@ -96,7 +111,9 @@ def test_the_deviation_is_what_observations_and_slopes_leave_of_the_weights(monk
     rows = basis((new - process.shift) / process.width)
     missed = 1 - np.einsum("ni,ij,nj->n", rows[:, :m], np.linalg.inv(prior[:m, :m]), rows[:, :m])
     spread = np.einsum("ni,ij,nj->n", rows, np.linalg.inv(told), rows) + missed
-    assert process.deviation(new) ** 2 / process.variance == pytest.approx(np.column_stack([spread, spread]), rel=1e-3, abs=1e-6)
+    assert process.deviation(new) ** 2 / process.variance == pytest.approx(
+        np.column_stack([spread, spread]), rel=1e-3, abs=1e-6
+    )
 
 
 def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():
@@ -108,7 +125,9 @@ def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():
     assert (value == process(new)).all()
     for i in range(2):
         step = h * np.eye(2)[i]
-        assert (process(new + step) - process(new - step)) / (2 * h) == pytest.approx(slopes[:, :, i], abs=1e-5)
+        assert (process(new + step) - process(new - step)) / (2 * h) == pytest.approx(
+            slopes[:, :, i], abs=1e-5
+        )
 
 
 def test_along_some_inputs_it_is_the_same_process_with_second_derivatives():
@@ -117,7 +136,9 @@ def test_along_some_inputs_it_is_the_same_process_with_second_derivatives():
     along = AlongInputs(process, [1, 0])
     value, slopes, second = along.at(new)
     known, gradient = process(new, derivative=True)
-    assert value == pytest.approx(known[:, 0], abs=1e-9) and slopes == pytest.approx(gradient[:, 0, ::-1], abs=1e-8)
+    assert value == pytest.approx(known[:, 0], abs=1e-9) and slopes == pytest.approx(
+        gradient[:, 0, ::-1], abs=1e-8
+    )
     for place, column in ((1, 0), (0, 1)):
         step = h * np.eye(2)[place]
         ends = [along.at(new + sign * step)[1] for sign in (1, -1)]
@@ -128,4 +149,9 @@ def test_the_metric_is_found_on_one_state_of_each_path_first():
     groups = np.array([7, 7, 7, 7, 2, 2, 5, 7, 2, 7])
     rows = _spread_over(groups, np.random.default_rng(0))
     assert sorted(rows) == list(range(10))
-    assert [sorted(groups[rows[i:j]]) for i, j in ((0, 3), (3, 5), (5, 7), (7, 10))] == [[2, 5, 7], [2, 7], [2, 7], [7, 7, 7]]
+    assert [sorted(groups[rows[i:j]]) for i, j in ((0, 3), (3, 5), (5, 7), (7, 10))] == [
+        [2, 5, 7],
+        [2, 7],
+        [2, 7],
+        [7, 7, 7],
+    ]

@@ -16,7 +16,9 @@ from reduced.helical import HelicalCell
 SEGMENT = Segment("one-sided", 60.0, 5, width=10.0, channel_width=2.0, material=NeoHookean(mu=0.2068))
 
 
-@pytest.mark.parametrize("law, size", [(laws.membrane, 4), (laws.panel, 3), (laws.bulged_wall, 4), (laws.product, 3)])
+@pytest.mark.parametrize(
+    "law, size", [(laws.membrane, 4), (laws.panel, 3), (laws.bulged_wall, 4), (laws.product, 3)]
+)
 def test_derivatives_of_the_laws(law, size, assert_derivatives):
     a = np.array([1.1, 0.2, -0.1, 0.9])[:size] + (0.3 if size == 3 else 0.0)
 
@@ -58,7 +60,9 @@ def test_the_core_alone_has_the_modulus_three_mu():
     solid = weights.sum()
     s = cell.segment
     cavity = (s.core_top - s.cavity_floor) * s.cavity_thickness * s.width
-    assert solid == pytest.approx(s.pitch * (s.width * cell.cell.core_height - s.channel_width * 2.0) - cavity)
+    assert solid == pytest.approx(
+        s.pitch * (s.width * cell.cell.core_height - s.channel_width * 2.0) - cavity
+    )
     assert stiffness == pytest.approx(3 * cell.mu * solid)
 
 
@@ -82,7 +86,16 @@ def test_only_pressure_over_mu_and_shape_matter():
     e, k = HelicalCell(SEGMENT).strains(np.array([0.05]))
     softer = replace(SEGMENT, material=NeoHookean(mu=0.1034))
     np.testing.assert_allclose(HelicalCell(softer).strains(np.array([0.025]))[1], k, rtol=1e-9)
-    lengths = ("width", "chamber_height", "cavity_thickness", "wall", "gap", "top_wall", "side_wall", "base_thickness")
+    lengths = (
+        "width",
+        "chamber_height",
+        "cavity_thickness",
+        "wall",
+        "gap",
+        "top_wall",
+        "side_wall",
+        "base_thickness",
+    )
     lengths += ("roof", "channel_width", "channel_height", "cavity_floor")
     larger = replace(SEGMENT, **{name: 2 * getattr(SEGMENT, name) for name in lengths})
     e_larger, k_larger = HelicalCell(larger).strains(np.array([0.05]))

@@ -12,14 +12,27 @@ from reduced.states import COMMON, ENOUGH, PARTS, Sample, States, splits
 
 
 def sample(designs):
-    """Two states of each design, the second one with strains prescribed around it twofold and in some direction."""
+    """Two states of each design, the second one with strains prescribed around it twofold and in some
+    direction."""
     n = len(designs)
-    values = {"shape": np.ones((2 * n, 13)), "pressure": np.tile([0.0, 0.1], n), "level": np.zeros(2 * n, int)}
+    values = {
+        "shape": np.ones((2 * n, 13)),
+        "pressure": np.tile([0.0, 0.1], n),
+        "level": np.zeros(2 * n, int),
+    }
     values |= {"size": np.ones(2 * n), "closing": np.full(2 * n, np.nan), "touching": np.zeros(2 * n, bool)}
-    values |= {"strains": REST + np.outer(np.tile([0.0, 0.1], n), [1, 0, 0, 0, 1, 0]), "matrices": np.tile(np.eye(6), (2 * n, 1, 1))}
-    values |= {"strain_slopes": np.full((2 * n, 9, 6), np.nan), "matrix_slopes": np.full((2 * n, 9, 6, 6), np.nan)}
+    values |= {
+        "strains": REST + np.outer(np.tile([0.0, 0.1], n), [1, 0, 0, 0, 1, 0]),
+        "matrices": np.tile(np.eye(6), (2 * n, 1, 1)),
+    }
+    values |= {
+        "strain_slopes": np.full((2 * n, 9, 6), np.nan),
+        "matrix_slopes": np.full((2 * n, 9, 6, 6), np.nan),
+    }
     values |= {"directions": np.zeros((9, 13))}
-    free = States(ONE_SIDED, *(({"design": np.repeat(designs, 2)} | values)[f.name] for f in fields(States)[1:]))
+    free = States(
+        ONE_SIDED, *(({"design": np.repeat(designs, 2)} | values)[f.name] for f in fields(States)[1:])
+    )
     around = free.of(np.repeat(np.flatnonzero(free.pressure > 0), 2))
     change = np.where(np.arange(2 * n)[:, None] % 2, 0.3 * np.eye(6)[5], around.strains - REST)
     return Sample(free, around, change, change)
@@ -32,7 +45,9 @@ def test_few_held_out_designs_are_joined_by_every_training_design_once():
     judged = np.concatenate([there.designs for _, there in pairs[1:]])
     assert sorted(judged) == list(range(37))
     for learned, there in pairs[1:]:
-        assert not set(learned.designs) & set(there.designs) and len(learned.designs) + len(there.designs) == 37
+        assert (
+            not set(learned.designs) & set(there.designs) and len(learned.designs) + len(there.designs) == 37
+        )
         assert set(there.around.design) == set(there.designs)
     assert len(splits(training, sample(np.arange(100, 100 + ENOUGH)))) == 1
 
@@ -49,7 +64,9 @@ def test_a_mesh_of_few_designs_is_left_out():
         states = [replace(s, level=(s.design < fine).astype(int)) for s in (many.free, many.around)]
         two = replace(many, free=states[0], around=states[1])
         kept = two.on_common_meshes()
-        assert set(kept.free.level) == levels == set(kept.around.level) and len(kept.change) == len(kept.around.level)
+        assert set(kept.free.level) == levels == set(kept.around.level) and len(kept.change) == len(
+            kept.around.level
+        )
 
 
 def test_prescribed_states_are_told_apart():

@@ -17,7 +17,13 @@ from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
 from reduced.potential import monomials, whitening
 from reduced.states import sample_of
 from reduced.suggestion import most_telling
-from reduced.training import FURTHER_BY, designs_at_further_angles, judge_free_states_again, run_training, samples_of
+from reduced.training import (
+    FURTHER_BY,
+    designs_at_further_angles,
+    judge_free_states_again,
+    run_training,
+    samples_of,
+)
 
 SLOPES = {f.name: f.metadata["shape"] for f in columns() if f.name.endswith("_slopes")}
 DESIGNS, PRESSURES = 60, np.linspace(0, 0.3, 5)
@@ -51,14 +57,25 @@ def made_up_data():
     rows = {f.name: [] for f in columns()}
     for number, kind in enumerate(KINDS):
         for design in range(DESIGNS):
-            v = rng.uniform([45, 1.5, 0.6, 0.25, 0.15, 0.12, 0.3, 0.3, 0.25], [90, 2.5, 1.2, 0.4, 0.25, 0.25, 0.6, 0.6, 0.35])
+            v = rng.uniform(
+                [45, 1.5, 0.6, 0.25, 0.15, 0.12, 0.3, 0.3, 0.25],
+                [90, 2.5, 1.2, 0.4, 0.25, 0.25, 0.6, 0.6, 0.35],
+            )
             shape = dict(zip(("angle", "width", "chamber_height", "cavity_thickness", "wall", "top_wall"), v))
             shape |= {"base_thickness": v[6], "channel_width": v[7], "channel_height": v[8]}
             shape["gap"] = 1 - shape["cavity_thickness"] - 2 * shape["wall"]
             shape["side_wall"] = shape["roof"] = shape["top_wall"]
-            shape["cavity_floor"] = shape["channel_height"] / 2 * (1 if kind == ONE_SIDED else rng.uniform(0.3, 1))
+            shape["cavity_floor"] = (
+                shape["channel_height"] / 2 * (1 if kind == ONE_SIDED else rng.uniform(0.3, 1))
+            )
             s = np.array([shape[name] for name in SHAPE])
-            case = {"kind": number, "design": design, "held_out": design % 5 == 4, "shape": s, "limit_pressure": np.nan}
+            case = {
+                "kind": number,
+                "design": design,
+                "held_out": design % 5 == 4,
+                "shape": s,
+                "limit_pressure": np.nan,
+            }
             case["first_touch"] = np.nan
             for f in columns():
                 if f.metadata["of"] == "cases":
@@ -73,14 +90,26 @@ def made_up_data():
                 v = M[0] @ change
                 force = D1[0] * M[0].T @ (v + 4 * 0.7 * (v @ v) * v)  # 0.7 |v|^4: a sum of allowed monomials
                 add_state(rows, row, P, free + change, force, K, True)
-    about = {"kinds": list(KINDS), "meshes": [{"name": "a", "mesh_size_mm": 1}], "shape": list(SHAPE), "statuses": ["done"]}
+    about = {
+        "kinds": list(KINDS),
+        "meshes": [{"name": "a", "mesh_size_mm": 1}],
+        "shape": list(SHAPE),
+        "statuses": ["done"],
+    }
     about["directions"] = {kind: direction_matrix(kind).tolist() for kind in KINDS}
     about |= {"largest_symmetry_defect": 0.01, "revisions": ["made up"], "reasons": {}}
     return CellData(about, **{f.name: np.array(rows[f.name], f.metadata["type"]) for f in columns()})
 
 
 def add_state(rows, row, P, strains, forces, K, prescribed):
-    state = {"case": row, "prescribed": prescribed, "pressure": P, "strains": strains, "forces": forces, "stiffness": K[UPPER]}
+    state = {
+        "case": row,
+        "prescribed": prescribed,
+        "pressure": P,
+        "strains": strains,
+        "forces": forces,
+        "stiffness": K[UPPER],
+    }
     state |= {name: np.full(SLOPES[name], np.nan) for name in SLOPES}
     state["wall_distance"] = rows["shape"][row][SHAPE.index("gap")] * (1 - P)
     for f in columns():
@@ -130,7 +159,9 @@ def test_force_and_stiffness_are_slopes_of_psi_and_vanish_at_the_free_state(trai
     q = free + np.array([0.02, -0.01, 0.015, 0.004, -0.01, 0.006])
     for i in range(6):
         step = h * np.eye(6)[i]
-        assert (law.psi(q + step, P) - law.psi(q - step, P)) / (2 * h) == pytest.approx(law.force(q, P)[:, i], rel=1e-5, abs=1e-7)
+        assert (law.psi(q + step, P) - law.psi(q - step, P)) / (2 * h) == pytest.approx(
+            law.force(q, P)[:, i], rel=1e-5, abs=1e-7
+        )
         slope = (law.force(q + step, P) - law.force(q - step, P)) / (2 * h)
         assert slope == pytest.approx(law.stiffness(q, P)[:, i], rel=1e-5, abs=1e-5)
 
@@ -174,16 +205,26 @@ def test_held_out_figures_of_an_easy_law_are_small_and_its_intervals_honest(trai
 
 def test_designs_more_slanted_than_the_held_out_ones_are_judged_by_laws_that_have_not_seen_them(trained):
     data = made_up_data()
-    training, held_out = samples_of(replace(data, held_out=data.held_out & (data.shape[:, 0] > 60)))[ONE_SIDED]
+    training, held_out = samples_of(replace(data, held_out=data.held_out & (data.shape[:, 0] > 60)))[
+        ONE_SIDED
+    ]
     pairs = designs_at_further_angles(training, held_out)
     further = training.free.design[training.free.shape[:, 0] < held_out.free.shape[:, 0].min() - FURTHER_BY]
-    assert np.array_equal(np.sort(np.concatenate([judged.designs for _, judged in pairs])), np.unique(further)) and len(pairs) == 5
+    assert (
+        np.array_equal(np.sort(np.concatenate([judged.designs for _, judged in pairs])), np.unique(further))
+        and len(pairs) == 5
+    )
     for learned, judged in pairs:
         assert np.array_equal(np.union1d(learned.designs, judged.designs), training.designs)
         assert len(learned.designs) + len(judged.designs) == len(training.designs)
     learned, judged = pairs[0]
-    told = further_angles([(judged.designs, judge_free_states_again(trained[0].kinds[ONE_SIDED], learned, judged))])
-    assert told["further_angles_designs"] == len(judged.designs) and 0 < told["further_angles_strain_p95_rel"] < 0.02
+    told = further_angles(
+        [(judged.designs, judge_free_states_again(trained[0].kinds[ONE_SIDED], learned, judged))]
+    )
+    assert (
+        told["further_angles_designs"] == len(judged.designs)
+        and 0 < told["further_angles_strain_p95_rel"] < 0.02
+    )
     assert designs_at_further_angles(*samples_of(data)[ONE_SIDED]) == [] and further_angles([]) == {}
 
 
@@ -195,7 +236,8 @@ def test_it_says_when_it_is_asked_outside_and_by_how_much(trained):
     assert law.excess(segment, 0.2).max() > law.excess(segment, 0.15).max() > 0
     wide = replace(segment, width=40.0)
     assert any("width / normal pitch = 10 is outside" in text for text in law.doubts(wide, 0.01))
-    thin = replace(segment, base_thickness=0.4, channel_height=2.6, cavity_floor=1.3)  # the core is as high as before
+    # the core is as high as before
+    thin = replace(segment, base_thickness=0.4, channel_height=2.6, cavity_floor=1.3)
     assert any("base_thickness / normal pitch = 0.1 is outside" in text for text in law.doubts(thin, 0.01))
     other = design(ONE_SIDED, material=Yeoh(c10=0.125, c20=0.01))
     assert any("neo-Hookean" in text for text in law.doubts(other, 0.05))
@@ -241,7 +283,9 @@ def test_a_file_gives_the_same_law(trained):
         segment = design(kind)
         q = law.of(segment).free_strains(0.05) + 0.01
         assert (again.of(segment).force(q, 0.05) == law.of(segment).force(q, 0.05)).all()
-        assert again.of(segment).half_width(0.05) == pytest.approx(law.of(segment).half_width(0.05), rel=0.05, abs=1e-5)
+        assert again.of(segment).half_width(0.05) == pytest.approx(
+            law.of(segment).half_width(0.05), rel=0.05, abs=1e-5
+        )
     with pytest.raises(InputError, match="not a trained law"):
         (folder / "bad.npz").write_text("")
         read_law(folder / "bad.npz")
@@ -254,7 +298,9 @@ def test_on_the_same_data_the_metrics_of_a_law_give_it_again(trained):
     again = run_training(folder / "cells.npz", folder / "again.npz", **settings)
     for kind in KINDS:
         segment = design(kind)
-        assert again.of(segment).free_strains(0.05) == pytest.approx(law.of(segment).free_strains(0.05), rel=1e-9, abs=1e-12)
+        assert again.of(segment).free_strains(0.05) == pytest.approx(
+            law.of(segment).free_strains(0.05), rel=1e-9, abs=1e-12
+        )
         assert again.kinds[kind].quantile == pytest.approx(law.kinds[kind].quantile, rel=1e-6)
     assert "like_sha256" in again.about and "like_sha256" not in law.about
 
@@ -267,21 +313,25 @@ def test_how_far_walls_close_is_known_up_to_the_first_state_in_touch():
     met, at_level, never = (free.of(free.design == design) for design in range(3))
     gap, lead = met.shape[0, SHAPE.index("gap")], Coordinates(ONE_SIDED).leading(met.strains)
     touched = gap / np.interp(0.1, PRESSURES, lead)
-    assert met.closing == pytest.approx([np.nan, gap * PRESSURES[1] / lead[1], touched, np.nan, np.nan], nan_ok=True)
+    assert met.closing == pytest.approx(
+        [np.nan, gap * PRESSURES[1] / lead[1], touched, np.nan, np.nan], nan_ok=True
+    )
     assert met.touching.tolist() == at_level.touching.tolist() == [False, False, True, True, True]
     assert np.isfinite(at_level.closing).tolist() == [False, True, False, False, False]
     assert np.isfinite(never.closing).sum() == 4 and not never.touching.any()
 
 
 def test_stiffness_jumps_where_walls_touch():
-    """Walls of twisting cells close in proportion to the pressure; in touch, bending is stiffer by a factor and by how far they overlap."""
+    """Walls of twisting cells close in proportion to the pressure; in touch, bending is stiffer by a factor
+    and by how far they overlap."""
     data = made_up_data()
     wall, gap = (data.shape[:, SHAPE.index(name)].astype(float) for name in ("wall", "gap"))
     first = 0.16 * np.exp(wall - 0.2)
     closed = data.pressure / first[data.case]
     added = np.where(closed > 1, 0.4 + wall[data.case] + (closed - 1) * gap[data.case], 0.0)
     K = data.matrices.copy()
-    K[:, 4, 4] += (np.exp(added) - 1) * (K[:, 4, 4] - K[:, 4, 1] ** 2 / K[:, 1, 1])  # the last pivot of its block alone
+    # the last pivot of its block alone
+    K[:, 4, 4] += (np.exp(added) - 1) * (K[:, 4, 4] - K[:, 4, 1] ** 2 / K[:, 1, 1])
     touched = replace(
         data,
         first_touch=first.astype("f4"),
@@ -290,7 +340,10 @@ def test_stiffness_jumps_where_walls_touch():
     )
     learned, seen = (sample_of(touched, TWISTING, held_out).free for held_out in (False, True))
     closing = fit_closing(learned)
-    stiffness, closed = fit_stiffness(learned, closing), closing.closed(seen.shape, seen.pressure, seen.strains)
+    stiffness, closed = (
+        fit_stiffness(learned, closing),
+        closing.closed(seen.shape, seen.pressure, seen.strains),
+    )
     assert (closed > 1).tolist() == seen.touching.tolist() and 0.2 < seen.touching.mean() < 0.8
     assert stiffness_error(seen, stiffness.at(seen.shape, seen.strains, closed, 0)).max() < 0.05
     few = learned.of(np.isin(learned.design, np.unique(learned.design)[:8]))
@@ -299,11 +352,16 @@ def test_stiffness_jumps_where_walls_touch():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_paths_of_free_states_have_a_kink_where_walls_touch(kind):
-    """Walls close in proportion to the leading strain (one-sided) or the pressure; the more they overlap, the more the cell strains."""
+    """Walls close in proportion to the leading strain (one-sided) or the pressure; the more they overlap, the
+    more the cell strains."""
     data, rest = made_up_data(), np.zeros(6)
     rest[0] = 1.0
     wall, gap = (data.shape[:, SHAPE.index(name)].astype(float) for name in ("wall", "gap"))
-    first, strains, distance = 0.15 * np.exp(10 * (wall - 0.2)), data.strains.astype(float), np.zeros(len(data.strains))
+    first, strains, distance = (
+        0.15 * np.exp(10 * (wall - 0.2)),
+        data.strains.astype(float),
+        np.zeros(len(data.strains)),
+    )
     place = {ONE_SIDED: 4, TWISTING: 0}[kind]
     for i, case in enumerate(data.case):
         at_touch = true_free(kind, data.shape[case], first[case])[place] - rest[place]
@@ -312,12 +370,16 @@ def test_paths_of_free_states_have_a_kink_where_walls_touch(kind):
             closed = factor * lead / at_touch if kind == ONE_SIDED else data.pressure[i] / first[case]
             factor = 1 + 0.1 * np.log1p(max(closed - 1, 0) * gap[case] / 0.05)
         strains[i], distance[i] = rest + factor * change, max(1 - closed, 0) * gap[case]
-    touched = replace(data, first_touch=first.astype("f4"), strains=strains, wall_distance=distance.astype("f4"))
+    touched = replace(
+        data, first_touch=first.astype("f4"), strains=strains, wall_distance=distance.astype("f4")
+    )
     learned, seen = (sample_of(touched, kind, held_out).free.loaded for held_out in (False, True))
     told = fit_path(learned, slopes=False)
     untold = fit_path(replace(learned, touching=np.zeros(len(learned.design), bool)), slopes=False)
     errors = [strain_error(seen, path.strains(seen.shape, seen.pressure, 0)) for path in (told, untold)]
-    assert errors[0].max() < 0.03 and errors[0].mean() < errors[1].mean() / 2 and untold.closing.process is None
+    assert (
+        errors[0].max() < 0.03 and errors[0].mean() < errors[1].mean() / 2 and untold.closing.process is None
+    )
     shape, P, h = seen.shape[:1], np.array([0.25]), 1e-5
     assert told.closing.overlap(shape, P, told.at(shape, P, 0)[0]) > 0
     _, slopes = told.strains_and_slopes(shape, P, 0)
@@ -329,7 +391,8 @@ def test_paths_of_free_states_have_a_kink_where_walls_touch(kind):
 
 
 def test_beyond_a_limit_load_strains_stay_and_it_says_so():
-    """Cells whose pressure over the leading strain falls, P = a q (1 - q), up to 0.996 of the limit load a/4."""
+    """Cells whose pressure over the leading strain falls, P = a q (1 - q), up to 0.996 of the limit load
+    a/4."""
     data = made_up_data()
     rows = np.flatnonzero(~data.prescribed & (data.pressure > 0))
     strains, pressure, lead = data.strains.copy(), data.pressure.copy(), {ONE_SIDED: 4, TWISTING: 0}

@@ -1,4 +1,5 @@
-"""The loaded rod: exact derivatives, the elastica, a helix under a tip moment, objectivity, order, load steps, buckling, bad input."""
+"""The loaded rod: exact derivatives, the elastica, a helix under a tip moment, objectivity, order, load
+steps, buckling, bad input."""
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ REST = np.eye(6)[0]
 #: EA, GA, GA in N, GJ, EI, EI in N mm2
 SLENDER = np.diag([40.0, 15.0, 15.0, 70.0, 80.0, 250.0])
 HELICAL = np.array([1.05, -0.02, 0.0, 0.013, 0.014, 0.0])
-COUPLED = SLENDER + np.array([[0, 0, 0, -3, -18, 0.1], *np.zeros((3, 6)), [-18, 1, 0, -15, 0, 0], np.zeros(6)])
+COUPLED = SLENDER + np.array(
+    [[0, 0, 0, -3, -18, 0.1], *np.zeros((3, 6)), [-18, 1, 0, -15, 0, 0], np.zeros(6)]
+)
 COUPLED = (COUPLED + COUPLED.T) / 2
 
 
@@ -52,7 +55,10 @@ class Stiffening:
 
     def stiffness(self, q, P):
         g, w = self._w(q)
-        return COUPLED * (1 + 2 * w / self.scale)[..., None, None] + 4 / self.scale * g[..., :, None] * g[..., None, :]
+        return (
+            COUPLED * (1 + 2 * w / self.scale)[..., None, None]
+            + 4 / self.scale * g[..., :, None] * g[..., None, :]
+        )
 
 
 MIXED = Rod(
@@ -80,18 +86,26 @@ def test_gradient_hessian_and_newton_step_are_exact(moment):
     n = x.size
     gradient, hessian = elements.gradient(x, loads).ravel(), elements.hessian(x, loads).reshape(n, n)
     moved = [d.reshape(x.shape) for d in step * np.eye(n)]
-    slope = np.array([(elements.gradient(x + d, loads) - elements.gradient(x - d, loads)).ravel() / (2 * step) for d in moved])
+    slope = np.array(
+        [
+            (elements.gradient(x + d, loads) - elements.gradient(x - d, loads)).ravel() / (2 * step)
+            for d in moved
+        ]
+    )
     np.testing.assert_allclose(hessian, slope.T, atol=1e-7)
     symmetric = abs(hessian - hessian.T).max() < 1e-11 * abs(hessian).max()
     assert symmetric == loads.conservative
     if loads.conservative:
         work = [(elements.energy(x + d, loads) - elements.energy(x - d, loads)) / (2 * step) for d in moved]
         np.testing.assert_allclose(gradient, work, atol=1e-7)
-    np.testing.assert_allclose(elements.newton_step(x, loads)[0].ravel(), np.linalg.solve(hessian, -gradient), atol=1e-12)
+    np.testing.assert_allclose(
+        elements.newton_step(x, loads)[0].ravel(), np.linalg.solve(hessian, -gradient), atol=1e-12
+    )
 
 
 def planar_elastica(length, curvature, force, weight, moment):
-    """Tip (x, z, angle about y) of a rod of stiffness SLENDER in the x-z plane by its balance as a boundary value problem."""
+    """Tip (x, z, angle about y) of a rod of stiffness SLENDER in the x-z plane by its balance as a boundary
+    value problem."""
     EA, _, GA, _, EI, _ = np.diag(SLENDER)
 
     s = np.linspace(0, length, 101)
@@ -105,7 +119,9 @@ def planar_elastica(length, curvature, force, weight, moment):
             dx, dz = e1 * c + e3 * n, -e1 * n + e3 * c
             return np.array([dx, dz, curvature + y[3] / EI, dx * nz - dz * nx])
 
-        start = solve_bvp(slope, lambda a, b: np.array([*a[:3], b[3] - moment]), s, guess, tol=1e-10, max_nodes=100000)
+        start = solve_bvp(
+            slope, lambda a, b: np.array([*a[:3], b[3] - moment]), s, guess, tol=1e-10, max_nodes=100000
+        )
         assert start.success
         guess = start.sol(s)
     return start.y[:3, -1]
@@ -128,7 +144,8 @@ def test_planar_elastica(force, weight, moment):
 
 
 def test_a_tip_moment_winds_a_straight_rod_into_a_helix():
-    """Equal bending stiffnesses: t' = M x t/EI, so the tangent turns about the moment at a constant rate: exact."""
+    """Equal bending stiffnesses: t' = M x t/EI, so the tangent turns about the moment at a constant rate:
+    exact."""
     length, EI, moment = 80.0, 90.0, np.array([2.0, 3.0, -1.5])
     rod = uniform(length, REST, np.diag([40.0, 15.0, 15.0, 60.0, EI, EI]))
     tip = rod.equilibrium(DeadLoads(tip_moment=moment), tolerance=1e-6).tip
@@ -201,7 +218,10 @@ def test_a_law_that_stiffens_bends_less_and_slow_loading_ends_there_too():
     force = DeadLoads(tip_force=(0.0, 0.05, -0.05))
     hard, soft = (Rod([Piece(40.0, own)]) for own in (Stiffening(0.05), law(HELICAL, COUPLED)))
     at_once, slowly = hard.equilibrium(force), hard.equilibrium(force, first_load=0.1)
-    moved = [np.linalg.norm(state.tip[:3, 3] - rod.free().points[-1]) for state, rod in ((at_once, hard), (soft.equilibrium(force), soft))]
+    moved = [
+        np.linalg.norm(state.tip[:3, 3] - rod.free().points[-1])
+        for state, rod in ((at_once, hard), (soft.equilibrium(force), soft))
+    ]
     assert 1 < moved[0] < 0.9 * moved[1] and slowly.load_steps > at_once.load_steps
     np.testing.assert_allclose(slowly.tip, at_once.tip, atol=1e-4)
 
@@ -219,7 +239,8 @@ def test_a_column_is_stable_below_its_buckling_load_and_refused_above():
 
 
 def test_a_long_finger_hangs_by_its_weight():
-    """180 mm, level, soft: bends down by more than its pressure bends it; twice as stiff and heavy it hangs the same."""
+    """180 mm, level, soft: bends down by more than its pressure bends it; twice as stiff and heavy it hangs
+    the same."""
     free = [1.02, 0, 0, 0.0, -0.004, 0.0]  # bends up
     finger = uniform(180.0, free, SLENDER, mass=7e-8)
     hanging = finger.equilibrium(DeadLoads((0, 0, -9810.0)))
@@ -233,17 +254,20 @@ def test_a_long_finger_hangs_by_its_weight():
 
 
 def test_weight_beside_the_line_twists():
-    """Level rod, mass centre 1 mm beside the line: torque w y L at the base, turning the tip by w y L^2/(2 GJ)."""
+    """Level rod, mass centre 1 mm beside the line: torque w y L at the base, turning the tip by w y L^2/(2
+    GJ)."""
     length, mass = 40.0, 1e-8
-    tip = uniform(length, REST, np.diag([1e6, 1e6, 1e6, 70.0, 1e6, 1e6]), mass=mass, mass_centre=(1.0, 0.0)).equilibrium(
-        DeadLoads((0, 0, -9810.0)), tolerance=1e-6
-    )
+    tip = uniform(
+        length, REST, np.diag([1e6, 1e6, 1e6, 70.0, 1e6, 1e6]), mass=mass, mass_centre=(1.0, 0.0)
+    ).equilibrium(DeadLoads((0, 0, -9810.0)), tolerance=1e-6)
     turn = -mass * 9810 * length**2 / (2 * 70.0)
     assert se3.log_rotation(tip.tip[:3, :3])[0] == pytest.approx(turn, rel=1e-3)
 
 
 class TestOfAManipulator:
-    body = Manipulator((CASES["twist_w12"](angle=60.0, chambers=3), CASES["one_sided_w10"](angle=90.0, chambers=4)))
+    body = Manipulator(
+        (CASES["twist_w12"](angle=60.0, chambers=3), CASES["one_sided_w10"](angle=90.0, chambers=4))
+    )
     laws = [law([1.04, 0, 0, 0.02, 0, 0]), law([1.02, 0, 0, 0, 0.015, 0])]
 
     def test_pieces_are_active_and_passive_in_turn(self):
@@ -289,7 +313,8 @@ class TestOfAManipulator:
         np.testing.assert_allclose(image, flip @ tip @ flip, atol=1e-8)
 
     def test_weight_is_the_bodys(self):
-        """one-sided-w10 at 90 degrees, one pitch: core 250 + block 160 - channel 20 - cavity 64 = 326 mm3; bare core 46 mm2."""
+        """one-sided-w10 at 90 degrees, one pitch: core 250 + block 160 - channel 20 - cavity 64 = 326 mm3;
+        bare core 46 mm2."""
         rod = Rod.of(Manipulator(self.body.segments[1:]), self.laws[1], 0.02)
         density = self.body.segments[1].material.density
         assert rod.pieces[1].mass * rod.pieces[1].length == pytest.approx(4 * 326 * density)
@@ -305,16 +330,28 @@ BAD = {
     "pressure": (lambda: Piece(1.0, law(), -1e-3), "pressure_kPa = -1"),
     "mass": (lambda: Piece(1.0, law(), mass=np.nan), "mass = nan"),
     "pose": (lambda: Rod([Piece(1.0, law())], 2 * np.eye(4)), "base_pose"),
-    "no law": (lambda: Piece(1.0, 3.0), "law: float is no rod law, which has free_strains, psi, force, stiffness"),
+    "no law": (
+        lambda: Piece(1.0, 3.0),
+        "law: float is no rod law, which has free_strains, psi, force, stiffness",
+    ),
     "tolerance": (lambda: MIXED.equilibrium(tolerance=0.0), "tolerance = 0 must lie in"),
     "first load": (lambda: MIXED.equilibrium(first_load=2.0), "first_load = 2 must lie in"),
     "loads": (lambda: MIXED.equilibrium(DeadLoads((0, 0, np.nan))), "loads: give three finite numbers"),
-    "laws": (lambda: Rod.of(TestOfAManipulator.body, [law()] * 3, 0.0), "one for all or one for each of the 2 segments"),
-    "pressures": (lambda: Rod.of(TestOfAManipulator.body, law(), (0.0, 0.0, 0.0)), "one for all or one for each of the 2 segments"),
+    "laws": (
+        lambda: Rod.of(TestOfAManipulator.body, [law()] * 3, 0.0),
+        "one for all or one for each of the 2 segments",
+    ),
+    "pressures": (
+        lambda: Rod.of(TestOfAManipulator.body, law(), (0.0, 0.0, 0.0)),
+        "one for all or one for each of the 2 segments",
+    ),
     "states": (lambda: QuadraticLaw([0.02, 0.01], [REST] * 2, [SLENDER] * 2), "increasing pressures"),
     "unsymmetric": (lambda: law(stiffness=SLENDER + np.eye(6, k=1)), "finite and symmetric"),
     "indefinite": (lambda: law(stiffness=-SLENDER), "positive definite"),
-    "beyond": (lambda: QuadraticLaw([0.0, 0.01], [REST] * 2, [SLENDER] * 2).free_strains(0.02), "this law knows 0..10 kPa"),
+    "beyond": (
+        lambda: QuadraticLaw([0.0, 0.01], [REST] * 2, [SLENDER] * 2).free_strains(0.02),
+        "this law knows 0..10 kPa",
+    ),
 }
 
 
@@ -326,12 +363,21 @@ def test_bad_input_is_refused_in_one_line(call, message):
 
 
 def test_quadratic_law_has_consistent_derivatives_and_shapes():
-    states = QuadraticLaw([0.0, 0.02, 0.05], [REST, HELICAL, HELICAL * 1.2], [SLENDER, COUPLED, 1.1 * COUPLED])
+    states = QuadraticLaw(
+        [0.0, 0.02, 0.05], [REST, HELICAL, HELICAL * 1.2], [SLENDER, COUPLED, 1.1 * COUPLED]
+    )
     rng, step = np.random.default_rng(5), 1e-6
     q, P = HELICAL + 0.01 * rng.standard_normal((4, 6)), np.array([0.0, 0.01, 0.03, 0.05])
-    assert states.psi(q, P).shape == (4,) and states.force(q, P).shape == (4, 6) and states.stiffness(q, P).shape == (4, 6, 6)
+    assert (
+        states.psi(q, P).shape == (4,)
+        and states.force(q, P).shape == (4, 6)
+        and states.stiffness(q, P).shape == (4, 6, 6)
+    )
     for i, d in enumerate(step * np.eye(6)):
-        for value, slope in ((states.psi, states.force(q, P)[:, i]), (states.force, states.stiffness(q, P)[..., i])):
+        for value, slope in (
+            (states.psi, states.force(q, P)[:, i]),
+            (states.force, states.stiffness(q, P)[..., i]),
+        ):
             np.testing.assert_allclose(slope, (value(q + d, P) - value(q - d, P)) / (2 * step), atol=1e-6)
     np.testing.assert_allclose(states.free_strains(P)[1], (REST + HELICAL) / 2)
     np.testing.assert_allclose(states.force(states.free_strains(P), P), 0.0, atol=1e-12)

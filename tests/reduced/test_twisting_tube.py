@@ -1,4 +1,5 @@
-"""The twisting tube: recomputed reference numbers, an exact solution, symmetries, and the paper's printed form."""
+"""The twisting tube: recomputed reference numbers, an exact solution, symmetries, and the paper's printed
+form."""
 
 import numpy as np
 import pytest
@@ -55,7 +56,8 @@ def test_the_limit_load_is_named():
 
 
 def test_printed_constants_bound_the_twist():
-    """With E_t = 0.008 MPa the tube twists a tenth of the paper's 0.033 rad/mm at most, up to its limit load."""
+    """With E_t = 0.008 MPa the tube twists a tenth of the paper's 0.033 rad/mm at most, up to its limit
+    load."""
     tau, _, _ = largest_twist(TwistingTube(3.0, 7.0, 0.317, 0.008), range(30, 90, 10), 4e-3)
     assert 0 < tau < 0.003
 
@@ -70,7 +72,8 @@ def test_printed_equations_have_no_solution(multiplier):
 
 def test_section_areas_are_the_closed_forms():
     s = Segment("twisting", 60.0, 5, cavity_floor=0.5, chamber_height=5.5, gap=2.0)
-    channel, cavity, shared = 4 * 2, 2 * 10 * 5.5, 2 * 4 * 0.5  # per chamber: thickness x ..., over 6 mm of pitch
+    # per chamber: thickness x ..., over 6 mm of pitch
+    channel, cavity, shared = 4 * 2, 2 * 10 * 5.5, 2 * 4 * 0.5
     assert empty_area(s) == pytest.approx(channel + 2 * (cavity - shared) / 6)
     assert occupied_area(s) + empty_area(s) == pytest.approx(12 * 4 + 2 * 4 * 12 * (7 - 2) / 6)
     Ri, Ro = equivalent_radii(s)

@@ -1,4 +1,5 @@
-"""Meshes of bodies with known solutions: round ones with second-order geometry, boxes and what a map makes of them (mm).
+"""Meshes of bodies with known solutions: round ones with second-order geometry, boxes and what a map makes of
+them (mm).
 
 Faces are tagged alike: the planes x, y, z = 0, the inner and the outer surface of a round body, the far ends.
 """
@@ -14,8 +15,8 @@ INNER, PLANE_X, PLANE_Y, PLANE_Z, OUTER, END, END_Y, END_Z = range(1, 9)
 
 
 def round_body(folder, name, size, solid=1):
-    """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or axis;
-    solid: tag of its cells."""
+    """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or
+    axis; solid: tag of its cells."""
     comm, path = MPI.COMM_WORLD, folder / f"{name}.msh"
     if comm.rank == 0:
         gmsh.initialize()
@@ -60,7 +61,11 @@ SLICE = 0.25
 def tube():
     """A quarter of a slice of a tube along x with radii 1 and 2."""
     occ = gmsh.model.occ
-    return _octant(occ.cut([(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 2))], [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 1))])[0])
+    return _octant(
+        occ.cut(
+            [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 2))], [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 1))]
+        )[0]
+    )
 
 
 def cylinder(layers=4):
@@ -84,7 +89,8 @@ def _cylinder_faces(box):
     return PLANE_X if box[3] < 1e-4 else END if box[0] > 1 - 1e-4 else OUTER
 
 
-#: name -> (draws the solid and returns its volume, tag of a face from its bounding box, what edge lengths go with)
+#: name -> (draws the solid and returns its volume, tag of a face from its bounding box, what edge lengths go
+#: with)
 ROUND = {
     "sphere": (sphere, _hollow_faces, "sqrt(x*x+y*y+z*z)"),
     "tube": (tube, lambda box: _hollow_faces(box, SLICE), "sqrt(y*y+z*z)"),
@@ -93,15 +99,21 @@ ROUND = {
 
 
 def box(lengths, counts, move=None, solid=1):
-    """(mesh, cell tags, facet tags) of a box from the origin, each of its (nx, ny, nz) bricks cut into 6 tetrahedra.
+    """(mesh, cell tags, facet tags) of a box from the origin, each of its (nx, ny, nz) bricks cut into 6
+    tetrahedra.
 
-    move: X (n, 3) -> (n, 3), where its vertices go; facet tags are those of the box before. solid: tag of its cells.
+    move: X (n, 3) -> (n, 3), where its vertices go; facet tags are those of the box before. solid: tag of its
+    cells.
     """
     mesh = create_box(MPI.COMM_WORLD, [[0.0, 0.0, 0.0], list(lengths)], list(counts), CellType.tetrahedron)
     where, tags = [], []
     for axis, ends in enumerate(((PLANE_X, END), (PLANE_Y, END_Y), (PLANE_Z, END_Z))):
         for tag, place in zip(ends, (0.0, lengths[axis])):
-            where.append(locate_entities_boundary(mesh, 2, lambda x, axis=axis, place=place: np.isclose(x[axis], place)))
+            where.append(
+                locate_entities_boundary(
+                    mesh, 2, lambda x, axis=axis, place=place: np.isclose(x[axis], place)
+                )
+            )
             tags.append(np.full(len(where[-1]), tag, np.int32))
     facets, tags = np.concatenate(where), np.concatenate(tags)
     order = np.argsort(facets)
@@ -109,7 +121,11 @@ def box(lengths, counts, move=None, solid=1):
     cells = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
     if move is not None:
         mesh.geometry.x[:] = move(mesh.geometry.x)
-    return mesh, meshtags(mesh, 3, cells, np.full(len(cells), solid, np.int32)), meshtags(mesh, 2, facets[order], tags[order])
+    return (
+        mesh,
+        meshtags(mesh, 3, cells, np.full(len(cells), solid, np.int32)),
+        meshtags(mesh, 2, facets[order], tags[order]),
+    )
 
 
 def strip(lengths, counts):

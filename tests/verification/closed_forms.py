@@ -1,4 +1,5 @@
-"""Exact solutions for incompressible neo-Hookean bodies (mu = 1 MPa) and for the elastica. Round ones: radii 1 and 2 mm."""
+"""Exact solutions for incompressible neo-Hookean bodies (mu = 1 MPa) and for the elastica. Round ones: radii
+1 and 2 mm."""
 
 import numpy as np
 from scipy.integrate import solve_bvp
@@ -50,19 +51,24 @@ def capped_tube(P):
 
 
 def torsion(stretch, twist):
-    """(torque, axial force) of a solid cylinder of radius 1 at this stretch and twist per undeformed length."""
+    """(torque, axial force) of a solid cylinder of radius 1 at this stretch and twist per undeformed
+    length."""
     a2 = 1 / stretch
-    return np.pi * twist / (2 * stretch), np.pi * a2 * (stretch**2 - 1 / stretch) - np.pi * twist**2 * a2**2 / 4
+    return np.pi * twist / (2 * stretch), np.pi * a2 * (
+        stretch**2 - 1 / stretch
+    ) - np.pi * twist**2 * a2**2 / 4
 
 
 def flexure_radii(k):
-    """(inner, outer) radius of a block of height 1 bent to the angle k per undeformed length, in plane strain."""
+    """(inner, outer) radius of a block of height 1 bent to the angle k per undeformed length, in plane
+    strain."""
     inner = np.sqrt(np.sqrt(1 / k**2 + 1 / k**4) - 1 / k)
     return inner, 1 / (k * k * inner)
 
 
 def flexure_moment(k):
-    """Moment per thickness of that block: -int r s_rr dr with s_rr = w(r) - w(r1), w = (k^2 r^2 + 1/(k^2 r^2))/2."""
+    """Moment per thickness of that block: -int r s_rr dr with s_rr = w(r) - w(r1), w = (k^2 r^2 + 1/(k^2
+    r^2))/2."""
     r1, r2 = flexure_radii(k)
 
     def integral(r):  # of r w(r)
@@ -79,10 +85,14 @@ def flexure_pressure(k, r):
 
 
 def elastica(EI, length, force, weight, moment):
-    """Tip (x, z) of an inextensible elastica clamped along x under a downward tip force (N), weight per length and tip moment."""
+    """Tip (x, z) of an inextensible elastica clamped along x under a downward tip force (N), weight per
+    length and tip moment."""
 
-    def slope(s, y):  # angle, its derivative; EI angle'' = (force + weight (L - s)) cos(angle), downwards positive
-        return np.vstack([y[1], -(force + weight * (length - s)) * np.cos(y[0]) / EI, np.cos(y[0]), np.sin(y[0])])
+    # angle, its derivative; EI angle'' = (force + weight (L - s)) cos(angle), downwards positive
+    def slope(s, y):
+        return np.vstack(
+            [y[1], -(force + weight * (length - s)) * np.cos(y[0]) / EI, np.cos(y[0]), np.sin(y[0])]
+        )
 
     def ends(a, b):
         return np.array([a[0], b[1] - moment / EI, a[2], a[3]])

@@ -1,7 +1,8 @@
 """The work that the pressure does on a pneu-net is the energy stored in it.
 
-Int P dV = P V - int V dP, the last by Simpson's rule over states at equal steps of pressure: the rule on every state, on every
-second and on every fourth shows its own error, a sixteenth each time the step is halved.
+Int P dV = P V - int V dP, the last by Simpson's rule over states at equal steps of pressure: the rule on
+every state, on every second and on every fourth shows its own error, a sixteenth each time the step is
+halved.
 """
 
 import numpy as np
@@ -15,12 +16,17 @@ PRESSURE = 0.02
 
 
 def balance(intervals=8):
-    """([(intervals, work of the pressure / stored energy - 1), coarsest rule first], dofs) of the shipped two-segment body."""
+    """([(intervals, work of the pressure / stored energy - 1), coarsest rule first], dofs) of the shipped
+    two-segment body."""
     design = read_design(reference_case.DATA / "reference.toml")
     solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
     pressures = np.linspace(0.0, PRESSURE, intervals + 1)
     volume = {0.0: solve.problem.cavity_volume()}
-    solve.run(PRESSURE, lambda measured: volume.update({measured.pressure: measured.volume}), milestones=pressures[1:])
+    solve.run(
+        PRESSURE,
+        lambda measured: volume.update({measured.pressure: measured.volume}),
+        milestones=pressures[1:],
+    )
     stored, dofs = solve.problem.stored_energy(), solve.problem.dofs
     solve.destroy()
     V = np.array([volume[P] for P in pressures])

@@ -1,4 +1,5 @@
-"""Cases with exact solutions: each a function of its mesh's resolution that returns a list of `Comparison`."""
+"""Cases with exact solutions: each a function of its mesh's resolution that returns a list of
+`Comparison`."""
 
 import numpy as np
 from scipy.optimize import root_scalar
@@ -20,7 +21,8 @@ FLEXURE_CURVATURES = (0.1, 0.25, 0.5, 1.0, 1.5)
 
 
 def sphere(folder, size=0.19):
-    """(radii at given pressures, pressures at given radii up to and past the limit, unstable directions at the latter).
+    """(radii at given pressures, pressures at given radii up to and past the limit, unstable directions at
+    the latter).
 
     Pressure control to 0.8, from there on volume control; radii are those of the cavity's volume.
     """
@@ -40,7 +42,8 @@ def sphere(folder, size=0.19):
     told = f"h = {size:g} r", system.problem.dofs
     system.destroy()
     rows = [
-        Comparison("sphere", f"a at P = {P}", *told, closed_forms.sphere_radius(P), a) for P, a in zip(SPHERE_PRESSURES, radii)
+        Comparison("sphere", f"a at P = {P}", *told, closed_forms.sphere_radius(P), a)
+        for P, a in zip(SPHERE_PRESSURES, radii)
     ]
     beyond = [
         Comparison("sphere, volume control", f"P at a = {a:g}", *told, closed_forms.sphere_pressure(a), P)
@@ -50,16 +53,20 @@ def sphere(folder, size=0.19):
 
 
 class _Tube:
-    """A quarter of a slice of a tube between two planes; the far one is held at a stretch that may be changed."""
+    """A quarter of a slice of a tube between two planes; the far one is held at a stretch that may be
+    changed."""
 
     def __init__(self, folder, size):
         self.stretch = 1.0
         end = Support(bodies.END, 0, lambda X, load: (self.stretch - 1) * X[:, 0])
-        self.system = body_system(bodies.round_body(folder, "tube", size), [*SYMMETRY, end], [Pressure((bodies.INNER,))])
+        self.system = body_system(
+            bodies.round_body(folder, "tube", size), [*SYMMETRY, end], [Pressure((bodies.INNER,))]
+        )
         self.told = f"h = {size:g} r", self.system.problem.dofs
 
     def radius(self):
-        """From the volume term of the inner wall: the integral of x.n/3 misses the third that the end planes carry."""
+        """From the volume term of the inner wall: the integral of x.n/3 misses the third that the end planes
+        carry."""
         return np.sqrt(6 * self.system.volume() / (np.pi * bodies.SLICE * self.stretch))
 
     def axial_force(self):
@@ -90,7 +97,9 @@ def capped_tube(folder, size=0.25):
         return held.axial_force() - P * np.pi * held.radius() ** 2
 
     for P in CAPPED_PRESSURES:
-        stretch = root_scalar(missing_thrust, args=(P,), x0=held.stretch, x1=held.stretch + 1e-3, xtol=1e-9).root
+        stretch = root_scalar(
+            missing_thrust, args=(P,), x0=held.stretch, x1=held.stretch + 1e-3, xtol=1e-9
+        ).root
         missing_thrust(stretch, P)
         a, exact_stretch = closed_forms.capped_tube(P)
         rows.append(Comparison("capped tube", f"a at P = {P}", *held.told, a, held.radius()))
@@ -100,7 +109,8 @@ def capped_tube(folder, size=0.25):
 
 
 def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
-    """(torque and axial force of a stretched and twisted cylinder, largest error of its displacements in mm)."""
+    """(torque and axial force of a stretched and twisted cylinder, largest error of its displacements in
+    mm)."""
 
     def motion(X, load):
         """The exact deformation at a fraction of the final stretch and twist per length."""
@@ -127,10 +137,12 @@ def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
 
 
 def flexure(cells=(4, 16), length=0.3, thickness=0.07):
-    """Moments of a block of height 1 bent in plane strain: rollers in the middle, an end section that turns as it should.
+    """Moments of a block of height 1 bent in plane strain: rollers in the middle, an end section that turns
+    as it should.
 
-    A strongly bent block wrinkles on its inner face (about 0.55 of its length is where a half-space becomes unstable, Biot
-    1963), so that a path followed from rest may leave the exact solution: each bending starts from that solution's interpolant.
+    A strongly bent block wrinkles on its inner face (about 0.55 of its length is where a half-space becomes
+    unstable, Biot 1963), so that a path followed from rest may leave the exact solution: each bending starts
+    from that solution's interpolant.
     """
 
     def radius(X, k):
@@ -148,10 +160,17 @@ def flexure(cells=(4, 16), length=0.3, thickness=0.07):
     system = body_system(bodies.box((length, 1.0, thickness), (*cells, 1)), supports, [])
     told, rows = (f"{cells[0]} x {cells[1]} x 1", system.problem.dofs), []
     for k in FLEXURE_CURVATURES:
-        solve_from(system, k, lambda X, k=k: motion(X, k), lambda X, k=k: closed_forms.flexure_pressure(k, radius(X, k)))
+        solve_from(
+            system,
+            k,
+            lambda X, k=k: motion(X, k),
+            lambda X, k=k: closed_forms.flexure_pressure(k, radius(X, k)),
+        )
         centre = (0.0, -closed_forms.flexure_radii(k)[0], 0.0)
         M = -system.problem.reaction(bodies.END, centre)[1][2] / thickness
-        rows.append(Comparison("plane-strain flexure", f"M at k = {k:g}", *told, closed_forms.flexure_moment(k), M))
+        rows.append(
+            Comparison("plane-strain flexure", f"M at k = {k:g}", *told, closed_forms.flexure_moment(k), M)
+        )
     system.destroy()
     return rows
 
@@ -160,18 +179,24 @@ STRIP = 90.0, 2.0, 2.0  # length, width, height, mm
 STRIP_DENSITY = 1.07e-9
 #: the load and its (tip force, weight per length, tip moment)
 STRIP_LOADS = {
-    "gravity": (Gravity(NeoHookean(1.0, density=STRIP_DENSITY), (0.0, 0.0, -9810.0)), (0.0, 9810 * STRIP_DENSITY * 4.0, 0.0)),
+    "gravity": (
+        Gravity(NeoHookean(1.0, density=STRIP_DENSITY), (0.0, 0.0, -9810.0)),
+        (0.0, 9810 * STRIP_DENSITY * 4.0, 0.0),
+    ),
     "force": (EndLoad(bodies.END, force=(0.0, 0.0, -5e-4)), (5e-4, 0.0, 0.0)),
     "moment": (EndLoad(bodies.END, moment=(0.0, 0.04, 0.0)), (0.0, 0.0, 0.04)),
 }
 
 
 def cantilever(name, cells=(60, 2, 2)):
-    """(tip (x, z) of a strip under one of STRIP_LOADS, that of the elastica with E = 3 mu and I = w h^3/12)."""
+    """(tip (x, z) of a strip under one of STRIP_LOADS, that of the elastica with E = 3 mu and I = w
+    h^3/12)."""
     length, width, height = STRIP
     load, elastica = STRIP_LOADS[name]
     system = body_system(bodies.strip(STRIP, cells), [Support(bodies.PLANE_X)], [load], spacing=4.0)
     follow(system, [1.0], lambda: None, first=0.2)
     X, u = from_all_ranks(system.problem, lambda X: X[:, 0] > length - 1e-6)
     system.destroy()
-    return (X + u)[:, [0, 2]].mean(axis=0), np.array(closed_forms.elastica(3 * width * height**3 / 12, length, *elastica))
+    return (X + u)[:, [0, 2]].mean(axis=0), np.array(
+        closed_forms.elastica(3 * width * height**3 / 12, length, *elastica)
+    )

@@ -1,4 +1,5 @@
-"""Bodies of one material under loads with a common value, followed to given loads; what was computed beside what is exact."""
+"""Bodies of one material under loads with a common value, followed to given loads; what was computed beside
+what is exact."""
 
 from dataclasses import dataclass
 
@@ -39,23 +40,34 @@ def body_system(mesh, supports, loads, material=None, spacing=None, body_force=N
         for load in loads:
             load.value.value = value
 
-    return BodySystem(problem, RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm, spacing), apply)
+    return BodySystem(
+        problem, RodCoordinates(problem.nodes, problem.owned_nodes, problem.mesh.comm, spacing), apply
+    )
 
 
 def follow(system, loads, observe, first=0.1, control=None, start=0.0, options=None):
-    """[observe()] at each of the growing `loads`, or values of another control's parameter from `start` on."""
+    """[observe()] at each of the growing `loads`, or values of another control's parameter from `start`
+    on."""
     seen = {}
     path = EquilibriumPath(system, control or LoadControl(), options, start)
-    run_steps(path, loads[-1], StepSize(first, 1e-4, milestones=tuple(loads)), lambda step: seen.update({step.load: observe()}))
+    run_steps(
+        path,
+        loads[-1],
+        StepSize(first, 1e-4, milestones=tuple(loads)),
+        lambda step: seen.update({step.load: observe()}),
+    )
     return [seen[load] for load in loads]
 
 
 def solve_from(system, load, displacement, pressure):
-    """Newton at `load` from the fields displacement(X (n, 3)) -> (n, 3) and pressure(X) -> (n,), interpolated."""
+    """Newton at `load` from the fields displacement(X (n, 3)) -> (n, 3) and pressure(X) -> (n,),
+    interpolated."""
     problem = system.problem
     state = problem.array.copy()
     state[problem.displacement_dofs] = displacement(problem.nodes)
-    state[problem.pressure_dofs] = pressure(problem.pressure_space.tabulate_dof_coordinates()[: len(problem.pressure_dofs)])
+    state[problem.pressure_dofs] = pressure(
+        problem.pressure_space.tabulate_dof_coordinates()[: len(problem.pressure_dofs)]
+    )
     system.load = load
     system.state = system.at_supports(state)
     return Newton(system, LoadControl()).solve(load)

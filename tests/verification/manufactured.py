@@ -1,8 +1,9 @@
 """A manufactured solution: incompressible finite strain chosen first, the forces it needs derived by hand.
 
-Two shears, each of a coordinate by the two others, make a deformation with det F = 1; with q = p - mu I1/3 the first
-Piola-Kirchhoff stress of the neo-Hookean body is P = mu F + q F^-T there, and since the columns of F^-T have no divergence, the
-body force is -(mu lap u + F^-T grad q). A unit cube, held at its exact displacement but for x = 1, where the traction P N acts.
+Two shears, each of a coordinate by the two others, make a deformation with det F = 1; with q = p - mu I1/3
+the first Piola-Kirchhoff stress of the neo-Hookean body is P = mu F + q F^-T there, and since the columns of
+F^-T have no divergence, the body force is -(mu lap u + F^-T grad q). A unit cube, held at its exact
+displacement but for x = 1, where the traction P N acts.
 """
 
 import numpy as np
@@ -45,7 +46,9 @@ class Traction:
         self.value = fem.Constant(problem.mesh, PETSc.ScalarType(0.0))
         _, F, q, _ = exact(ufl.SpatialCoordinate(problem.mesh))
         N = ufl.FacetNormal(problem.mesh)
-        ds = ufl.Measure("ds", domain=problem.mesh, subdomain_data=problem.facet_tags, metadata={"quadrature_degree": 6})
+        ds = ufl.Measure(
+            "ds", domain=problem.mesh, subdomain_data=problem.facet_tags, metadata={"quadrature_degree": 6}
+        )
         return -self.value * ufl.inner(F * N + q * ufl.inv(F).T * N, v) * ds(bodies.END)
 
     def update(self, problem):
@@ -62,10 +65,13 @@ def motion(X, load=1.0):
 
 
 def errors(cells):
-    """(L2 error of u in mm^(5/2), of p in MPa mm^(3/2), dofs) on cells^3 bricks, starting from the interpolant."""
+    """(L2 error of u in mm^(5/2), of p in MPa mm^(3/2), dofs) on cells^3 bricks, starting from the
+    interpolant."""
     faces = (bodies.PLANE_X, bodies.PLANE_Y, bodies.END_Y, bodies.PLANE_Z, bodies.END_Z)
     mesh = bodies.box((1.0, 1.0, 1.0), (cells,) * 3)
-    system = body_system(mesh, [Support(tag, None, motion) for tag in faces], [Traction()], body_force=body_force)
+    system = body_system(
+        mesh, [Support(tag, None, motion) for tag in faces], [Traction()], body_force=body_force
+    )
     problem = system.problem
     solve_from(system, 1.0, motion, lambda X: shifted_pressure(X.T, np.sin, np.cos))
     u, p = ufl.split(problem.state)

@@ -1,7 +1,9 @@
-"""Solid cylinders in a row, pressed together end to end while each is turned against the next: contact with an exact solution.
+"""Solid cylinders in a row, pressed together end to end while each is turned against the next: contact with
+an exact solution.
 
-A cell of one cylinder and a gap, at prescribed stretch and twist. Nothing rubs, so that each cylinder is compressed as if alone:
-uniformly, by a force that its shortening tells, and without a torque. The ends' meshes, turned, do not match.
+A cell of one cylinder and a gap, at prescribed stretch and twist. Nothing rubs, so that each cylinder is
+compressed as if alone: uniformly, by a force that its shortening tells, and without a torque. The ends'
+meshes, turned, do not match.
 """
 
 from dataclasses import dataclass
@@ -38,7 +40,8 @@ class Row:
 
 
 def exact_force(row, stretch, law):
-    """Axial force (N, tension positive) of the row at this stretch of a pitch, the penalty's overlap included."""
+    """Axial force (N, tension positive) of the row at this stretch of a pitch, the penalty's overlap
+    included."""
 
     def stress(own):
         return own - 1 / own**2
@@ -57,6 +60,11 @@ def pressed(folder, size=0.35, stretch=0.8, twist=0.25):
     facets = meshtags(mesh, 2, facets.indices, np.where(ends, cad.OUTER, facets.values).astype(np.int32))
     problem = CellProblem(row, (mesh, cells, facets), (bodies.OUTER,), centre=0.5, contact=penalty)
     state = held_at(problem, np.ones(6, bool), np.array([stretch, 0, 0, twist, 0, 0]))
-    told = "cell: pressed cylinders", f"axial force at e1 = {stretch:g}, k1 = {twist:g}", f"h = {size:g}", problem.unknowns
+    told = (
+        "cell: pressed cylinders",
+        f"axial force at e1 = {stretch:g}, k1 = {twist:g}",
+        f"h = {size:g}",
+        problem.unknowns,
+    )
     exact = exact_force(row, stretch, penalty.on(row.material.mu, row.gap))
     return Comparison(*told, exact, state.force[0]), float(state.moment[0]), state

@@ -1,4 +1,5 @@
-"""Published problems without exact solutions, orders of convergence, patch tests and the balance of energy."""
+"""Published problems without exact solutions, orders of convergence, patch tests and the balance of
+energy."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""Finite elements against exact solutions of incompressible neo-Hookean bodies, and strips against the elastica."""
+"""Finite elements against exact solutions of incompressible neo-Hookean bodies, and strips against the
+elastica."""
 
 import numpy as np
 import pytest
@@ -13,14 +14,28 @@ TABLES = {
         [closed_forms.sphere_radius(P) for P in exact_cases.SPHERE_PRESSURES],
         [1.03041551, 1.06516746, 1.10556673, 1.15365158, 1.21288815, 1.29005345, 1.40224705, 1.64253576],
     ),
-    "sphere's limit": ([closed_forms.sphere_pressure(closed_forms.SPHERE_LIMIT[0])], [closed_forms.SPHERE_LIMIT[1]]),
+    "sphere's limit": (
+        [closed_forms.sphere_pressure(closed_forms.SPHERE_LIMIT[0])],
+        [closed_forms.SPHERE_LIMIT[1]],
+    ),
     "tube": (
         [closed_forms.tube_radius(P) for P in exact_cases.TUBE_PRESSURES],
         [1.07349948, 1.16442825, 1.28157524, 1.44223655, 1.68810652, 2.17041900],
     ),
     "capped tube": (
         np.ravel([closed_forms.capped_tube(P) for P in exact_cases.CAPPED_PRESSURES]),
-        [1.07309642, 1.00088533, 1.16278684, 1.00436170, 1.27865588, 1.01267626, 1.44461525, 1.03189106, 1.78614674, 1.09683809],
+        [
+            1.07309642,
+            1.00088533,
+            1.16278684,
+            1.00436170,
+            1.27865588,
+            1.01267626,
+            1.44461525,
+            1.03189106,
+            1.78614674,
+            1.09683809,
+        ],
     ),
     "flexure": (
         [closed_forms.flexure_moment(k) for k in exact_cases.FLEXURE_CURVATURES],
@@ -40,10 +55,13 @@ def test_closed_forms_give_the_tabulated_values(computed, tabulated):
 
 
 def test_sphere_up_to_its_limit_point_and_past_it(shared_directory):
-    """Radii at given pressures; pressures at given radii to a = 2.2; beyond the limit one direction is unstable."""
+    """Radii at given pressures; pressures at given radii to a = 2.2; beyond the limit one direction is
+    unstable."""
     rows, past, unstable = exact_cases.sphere(shared_directory)
     assert_within(rows + past)
-    assert [n for a, n in zip(exact_cases.PAST_LIMIT_RADII, unstable) if a != closed_forms.SPHERE_LIMIT[0]] == [0, 1, 1, 1, 1]
+    assert [
+        n for a, n in zip(exact_cases.PAST_LIMIT_RADII, unstable) if a != closed_forms.SPHERE_LIMIT[0]
+    ] == [0, 1, 1, 1, 1]
 
 
 def test_tube_held_at_its_length(shared_directory):
