@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from base import se3
+from pneunet.base import se3
 
 
 def best_rigid_fit(reference, deformed, weights):

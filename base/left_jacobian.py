@@ -11,7 +11,7 @@ from math import factorial
 
 import numpy as np
 
-from base.se3 import hat
+from pneunet.base.se3 import hat
 
 TERMS = 16  # exact to rounding for turns up to 4 rad
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from base import se3
+from pneunet.base import se3
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,6 @@ import sys
 import time
 from pathlib import Path
 
-from base.files import write_text
-from base.record import machine, revision
 from benchmarks import (
     cell,
     chain,
@@ -29,6 +27,8 @@ from benchmarks import (
     verification,
 )
 from benchmarks.tables import table
+from pneunet.base.files.atomic import write_text
+from pneunet.base.files.record import machine, revision
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "bench"

@@ -16,9 +16,9 @@ GRADED = (1.5, 1.225, 1.0)
 
 
 def case(mesh_size, levels=10, graded=False):
-    from base.materials import NeoHookean
-    from hifi.cellfile import CellCase
-    from tests.cases import CASES
+    from pneunet.base.materials.laws import NeoHookean
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.hifi.cell.file import CellCase
 
     segment = CASES["one_sided_w10"](angle=60.0, chambers=1, material=NeoHookean(0.2068))
     return CellCase(segment, 0.05, mesh_size, levels, contact="none", graded=graded)
@@ -26,7 +26,7 @@ def case(mesh_size, levels=10, graded=False):
 
 def sweep(what, folder):
     """(CPU seconds, cells, states) of 0-50 kPa, the 6x6 stiffness at each level."""
-    from hifi.cell_run import solve_cell
+    from pneunet.hifi.cell.run import solve_cell
 
     states, started = [], time.process_time()
     _, facts = solve_cell(what, Path(folder) / "cell.msh", states.append)
@@ -35,8 +35,8 @@ def sweep(what, folder):
 
 def stiffness_difference(folder, mesh_size=2.0):
     """Largest |K d - (f(+) - f(-))/2| / |K d| over the six strains, in units of the stiffness's own scale."""
-    from hifi.cell_run import solve_cell
-    from hifi.cellfile import CellCase
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.run import solve_cell
 
     segment, path = case(mesh_size).segment, Path(folder) / "fd.msh"
     free, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1, contact="none"), path)
@@ -59,15 +59,15 @@ def stiffness_difference(folder, mesh_size=2.0):
 def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
     """Largest relative change when the cut moves (6x6 stiffness) and when the gauge does (what belongs to no
     section frame)."""
-    from geometry import cad
-    from geometry.cell import mesh_cell
-    from hifi.cell import CellProblem
-    from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
-    from hifi.control import LoadControl
-    from hifi.newton import NewtonOptions
-    from hifi.path import EquilibriumPath
-    from hifi.stepping import StepSize, run_steps
-    from tests.recut import recut
+    from pneunet.geometry.cad import body as cad
+    from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.hifi.cell.problem import CellProblem
+    from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+    from pneunet.hifi.path.control import LoadControl
+    from pneunet.hifi.path.equilibrium import EquilibriumPath
+    from pneunet.hifi.path.newton import NewtonOptions
+    from pneunet.hifi.path.stepping import StepSize, run_steps
+    from pneunet.hifi.verification.recut import recut
 
     segment, path, other = case(mesh_size).segment, Path(folder) / "cell.msh", Path(folder) / "recut.msh"
     mesh_cell(segment, mesh_size, path)
@@ -95,7 +95,7 @@ def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
 
 def unit_cell():
     """The part `cell`: ({key: value}, details)."""
-    from hifi.cellfile import CellCase
+    from pneunet.hifi.cell.file import CellCase
 
     default = CellCase.mesh_size
     with tempfile.TemporaryDirectory() as folder:

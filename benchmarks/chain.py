@@ -27,8 +27,8 @@ def setup():
 
 
 def ranks():
-    """Largest relative difference between 1 and 2 ranks over the numbers of tests/reference_case.py."""
-    from tests import reference_case
+    """Largest relative difference between 1 and 2 ranks over the numbers of hifi/verification/reference_case.py."""
+    from pneunet.hifi.verification import reference_case
 
     with tempfile.TemporaryDirectory() as folder:
         one, two = (reference_case.on_ranks(n, Path(folder) / f"{n}.json") for n in (1, 2))
@@ -68,9 +68,9 @@ def demo():
     start = time.perf_counter()
     subprocess.run(["make", "demo"], cwd=ROOT, check=True)
     seconds = time.perf_counter() - start
-    from design.comparison import Comparison
-    from design.rundata import read_run
-    from reduced import choose_law
+    from pneunet.design.report.comparison import Comparison
+    from pneunet.design.report.rundata import read_run
+    from pneunet.reduced import choose_law
 
     designed = read_run(ROOT / "out" / "demo")
     comparison = Comparison.of(designed, choose_law(designed.law))
@@ -97,10 +97,10 @@ def test():
 
 def long_segment():
     """Steps and factorisations of the case one-sided-long, 26 chambers at 60 degrees, 0-50 kPa, mesh 2 mm."""
-    from geometry import Manipulator
-    from geometry.mesh import mesh_manipulator
-    from hifi.manipulator import ManipulatorSolve
-    from tests.cases import CASES
+    from pneunet.geometry import Manipulator
+    from pneunet.geometry.cad.mesh import mesh_manipulator
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.hifi.body.manipulator import ManipulatorSolve
 
     body = Manipulator((CASES["one_sided_long"](angle=60.0, chambers=26),))
     with tempfile.TemporaryDirectory() as folder:

@@ -24,16 +24,16 @@ JUST_BEFORE = 0.985
 
 
 def segment(name="twist_w15", angle=60.0, mu=0.317):
-    from base.materials import NeoHookean
-    from tests.cases import CASES
+    from pneunet.base.materials.laws import NeoHookean
+    from pneunet.geometry.reference_cases import CASES
 
     return CASES[name](angle=angle, chambers=1, material=NeoHookean(mu))
 
 
 def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, **case):
     """(states, CPU seconds, pressure of first touch or None)."""
-    from hifi.cell_run import solve_cell
-    from hifi.cellfile import CellCase
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.run import solve_cell
 
     path, states, touches = Path(folder) / f"{time.monotonic_ns()}.msh", [], []
     started = time.process_time()
@@ -131,7 +131,7 @@ def bias(reference):
 
 def parameters(reference):
     """The penalty's stiffness and onset halved and doubled, one at a time."""
-    from hifi.wall_contact import WallPenalty
+    from pneunet.hifi.contact.penalty import WallPenalty
 
     rows, standard = [], WallPenalty()
     for name in ("stiffness", "onset"):
@@ -161,7 +161,7 @@ def finer_mesh(reference):
 
 def limit(values):
     """Where values at SOFTNESSES go as the medium vanishes: by the polynomial through them (Richardson)."""
-    from hifi.stepping import lagrange_coefficients
+    from pneunet.hifi.path.stepping import lagrange_coefficients
 
     return float(np.dot(lagrange_coefficients(SOFTNESSES, 0.0), values))
 
@@ -169,15 +169,15 @@ def limit(values):
 def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSES):
     """[[kPa, force (N) and twist (rad/m) at each of the softnesses]] of the third medium; ConvergenceError
     where it finds no state."""
-    from geometry.cell import mesh_cell
-    from hifi.cell import CellProblem
-    from hifi.cell_run import CONTACT_PATIENCE
-    from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
-    from hifi.contact import Softening, ThirdMedium
-    from hifi.control import LoadControl
-    from hifi.newton import NewtonOptions
-    from hifi.path import EquilibriumPath
-    from hifi.stepping import StepSize, run_steps
+    from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.hifi.cell.problem import CellProblem
+    from pneunet.hifi.cell.run import CONTACT_PATIENCE
+    from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+    from pneunet.hifi.contact.medium import Softening, ThirdMedium
+    from pneunet.hifi.path.control import LoadControl
+    from pneunet.hifi.path.equilibrium import EquilibriumPath
+    from pneunet.hifi.path.newton import NewtonOptions
+    from pneunet.hifi.path.stepping import StepSize, run_steps
 
     mesh_cell(body, size, path, gaps=True)
     followed = ThirdMedium()
@@ -205,7 +205,7 @@ def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSE
 
 def force_check(reference):
     """The force between chambers against the third medium's in the limit of no medium."""
-    from base.errors import ConvergenceError
+    from pneunet.base.errors import ConvergenceError
 
     try:
         rows = medium_forces(reference.body, reference.folder / "medium.msh")
@@ -221,7 +221,7 @@ def force_check(reference):
 
 def exact(reference):
     """Cylinders pressed together: their force is known."""
-    from tests.verification.pressed import pressed
+    from pneunet.hifi.verification.pressed import pressed
 
     force, torque, _ = pressed(reference.folder)
     return {"contact_pressed_force_rel": force.relative_error}, {

@@ -21,15 +21,15 @@ LEVELS = (0.01, 0.02, 0.03, 0.04, 0.05)
 def run(folder):
     from mpi4py import MPI
 
-    from base import se3
-    from base.materials import NeoHookean
-    from base.strains import RodStrains
-    from geometry import Manipulator
-    from geometry.mesh import mesh_manipulator
-    from hifi.agreement import on_rank_0
-    from hifi.manipulator import ManipulatorSolve
-    from hifi.wall_contact import WallPenalty
-    from tests.cases import CASES
+    from pneunet.base import se3
+    from pneunet.base.materials.laws import NeoHookean
+    from pneunet.base.strains import RodStrains
+    from pneunet.geometry import Manipulator
+    from pneunet.geometry.cad.mesh import mesh_manipulator
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.hifi.body.manipulator import ManipulatorSolve
+    from pneunet.hifi.contact.penalty import WallPenalty
+    from pneunet.hifi.fem.agreement import on_rank_0
 
     segment = CASES["twist_w15"](angle=60.0, chambers=CHAMBERS, material=NeoHookean(0.317))
     comm, body = MPI.COMM_WORLD, Manipulator((segment,))

@@ -20,10 +20,10 @@ JUDGED = (*FREE, "law_force_p95_rel")
 
 def law():
     """The part `law`."""
-    from base.dataset import read_dataset
-    from base.errors import InputError
-    from reduced.choice import DATA_SET, SHIPPED, read_law
-    from reduced.training import digest, held_out_figures, judged_on, samples_of
+    from pneunet.base.errors import InputError
+    from pneunet.base.files.dataset import read_dataset
+    from pneunet.reduced.choice import DATA_SET, SHIPPED, read_law
+    from pneunet.reduced.training.train import digest, held_out_figures, judged_on, samples_of
 
     data, shipped = read_dataset(DATA_SET), read_law(SHIPPED)
     if shipped.about["data_sha256"] != digest(DATA_SET):
@@ -70,8 +70,8 @@ def law():
 def slanted(shipped, data):
     """{kind: [(angles, number of designs, *figures FREE)]} of a RodLaw on a data set's designs in BANDS of
     angles."""
-    from reduced.judging import figures, misses
-    from reduced.states import sample_of
+    from pneunet.reduced.training.judging import figures, misses
+    from pneunet.reduced.training.states import sample_of
 
     out = {}
     for kind, law in shipped.kinds.items():
@@ -96,11 +96,11 @@ def _coarse(data):
 
 def costs(shipped):
     """What calls of a RodLaw cost, the dearer kind's, CPU s on one core."""
-    from geometry import Manipulator
-    from geometry.shape_numbers import shape_numbers
-    from reduced import predict
-    from reduced.choice import SHIPPED, read_law
-    from tests.cases import CASES
+    from pneunet.geometry import Manipulator
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.geometry.shape_numbers import shape_numbers
+    from pneunet.reduced import predict
+    from pneunet.reduced.choice import SHIPPED, read_law
 
     kinds = {"twisting": CASES["twist_w12"](60.0, 5), "one-sided": CASES["one_sided_w10"](60.0, 6)}
     known = [segment for kind, segment in kinds.items() if kind in shipped.kinds]

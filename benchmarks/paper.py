@@ -26,8 +26,8 @@ PAPER_TAU, PAPER_ANGLE, PAPER_TAU_10KPA = 0.033, 53.0, 0.0063
 
 
 def segment(case, angle, mu):
-    from base.materials import NeoHookean
-    from tests.cases import CASES
+    from pneunet.base.materials.laws import NeoHookean
+    from pneunet.geometry.reference_cases import CASES
 
     return CASES[case](angle=angle, chambers=1, material=NeoHookean(mu))
 
@@ -35,9 +35,9 @@ def segment(case, angle, mu):
 def sweep(body, contact, size=SIZE):
     """((pressures, 6) of e and k, nan where the path ended short; whether walls overlap; why it ended or
     None)."""
-    from base.errors import ConvergenceError, InputError
-    from hifi.cell_run import solve_cell
-    from hifi.cellfile import CellCase
+    from pneunet.base.errors import ConvergenceError, InputError
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.run import solve_cell
 
     strains, states, reason = np.full((len(PRESSURES), 6), np.nan), [], None
     case = CellCase(body, PRESSURES[-1], size, len(PRESSURES), contact=contact)
@@ -75,8 +75,8 @@ def fe(case, mu, angles):
 
 def curves(strains, angles):
     """TwistCurves of strains (angles, pressures, 6)."""
-    from base.strains import RodStrains
-    from reduced.calibration import TwistCurves
+    from pneunet.base.strains import RodStrains
+    from pneunet.reduced.analytic.calibration import TwistCurves
 
     rod = RodStrains(strains[..., :3], strains[..., 3:])
     return TwistCurves(np.array(angles), np.array(PRESSURES), rod.twist_per_deformed_length, rod.stretch)
@@ -89,9 +89,9 @@ def distance(model, wanted):
 
 def twisting(cells, angles):
     """{case: tube as it is, fits, and their curves} from {case: strains with contact}."""
-    from reduced.calibration import calibrate_tube, tube_curves
-    from reduced.model import segment_tube
-    from reduced.twisting import PAPER_FIBRE_MODULUS
+    from pneunet.reduced.analytic.calibration import calibrate_tube, tube_curves
+    from pneunet.reduced.analytic.twisting import PAPER_FIBRE_MODULUS
+    from pneunet.reduced.model import segment_tube
 
     found = {}
     for case, strains in cells.items():
@@ -137,8 +137,8 @@ def best(rows):
 def one_sided(strains, angles):
     """The one-sided model as it is and softened by one and by two constants, from strains (angles, pressures,
     6)."""
-    from reduced.calibration import calibrate_softness, softened_curvature
-    from reduced.helical import HelicalCell
+    from pneunet.reduced.analytic.calibration import calibrate_softness, softened_curvature
+    from pneunet.reduced.analytic.helical import HelicalCell
 
     bodies = [segment(ONE_SIDED, angle, ONE_SIDED_MU) for angle in angles]
     wanted = np.linalg.norm(strains[..., 3:], axis=-1)
@@ -165,8 +165,8 @@ def one_sided(strains, angles):
 def paper_tubes():
     """Tubes made as large as it takes to twist by the paper's 0.033 rad/mm at 50 kPa: a row each of `TUBES`,
     fibres `axial`."""
-    from reduced.calibration import tube_curves
-    from reduced.twisting import PAPER_MU, TwistingTube
+    from pneunet.reduced.analytic.calibration import tube_curves
+    from pneunet.reduced.analytic.twisting import PAPER_MU, TwistingTube
 
     rows, angles = [], np.arange(30.0, 86.0, 2.5)
     for modulus, ratio in TUBES:
@@ -187,10 +187,10 @@ def paper_tubes():
 
 
 def printed():
-    """What reduced.printed finds: the largest twist with the printed constants, and the printed equations'
+    """What reduced.analytic.printed finds: the largest twist with the printed constants, and the printed equations'
     least residuals."""
-    from reduced.printed import MULTIPLIERS, largest_twist, printed_equations
-    from reduced.twisting import PAPER_FIBRE_MODULUS, PAPER_MU, TwistingTube
+    from pneunet.reduced.analytic.printed import MULTIPLIERS, largest_twist, printed_equations
+    from pneunet.reduced.analytic.twisting import PAPER_FIBRE_MODULUS, PAPER_MU, TwistingTube
 
     tube = TwistingTube(3.0, 7.0, PAPER_MU, PAPER_FIBRE_MODULUS)
     residuals = {

@@ -64,7 +64,7 @@ The paper's numbers: tau is at most {paper_tau:g} rad/mm (also printed as 0.0325
 together: with a falling slope tau at {paper_angle:g} degrees and 50 kPa is less than five times that at
 10 kPa, 0.0315 at most. Tubes (axial, mu = 0.317 MPa) made as large as it takes to reach {paper_tau:g}:"""
 PRINTED = """\
-The printed constants and equations (`python -m reduced.printed`; Ri = 3, Ro = 7 mm): with E_t = 0.008 MPa
+The printed constants and equations (`python -m reduced.analytic.printed`; Ri = 3, Ro = 7 mm): with E_t = 0.008 MPa
 the consistent tube twists by at most {largest:.2g} rad/mm at any angle and pressure below its limit load,
 a {share:.0f}th of the paper's figure. With the radii of our cases it is a median {printed} off, beyond
 its limit load in {lost:.0f} % of the states. The printed equations have no solution (relative residual at
@@ -130,7 +130,7 @@ def _number(value, form="{:.1f}"):
 def _helix(strains, height):
     """P_t kappa_h / (2 pi cot(theta)) on the line at z = height (mm), of strains (angles, pressures, 6); 90
     degrees left out."""
-    from base.strains import RodStrains
+    from pneunet.base.strains import RodStrains
 
     strains = strains[:-1]
     e, k = strains[..., :3], strains[..., 3:]

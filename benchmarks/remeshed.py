@@ -18,13 +18,13 @@ FIGURES = ("strain", "tip", "stiffness", "stiffness where walls touch")
 
 def remeshed():
     """The part `remeshed`. Cases that are in FOLDER are not computed again."""
-    from base.dataset import read_dataset
-    from hifi.campaign import Gathering
-    from hifi.campaign_extension import Known
-    from hifi.campaignfile import read_campaign
-    from hifi.cases import run_cases
-    from reduced.choice import DATA_SET, SHIPPED, read_law
-    from reduced.states import sample_of
+    from pneunet.base.files.dataset import read_dataset
+    from pneunet.hifi.runs.campaign.campaign import Gathering
+    from pneunet.hifi.runs.campaign.extension import Known
+    from pneunet.hifi.runs.campaign.file import read_campaign
+    from pneunet.hifi.runs.cases import run_cases
+    from pneunet.reduced.choice import DATA_SET, SHIPPED, read_law
+    from pneunet.reduced.training.states import sample_of
 
     campaign = read_campaign(CAMPAIGN)
     coarse = campaign.meshes[0]
@@ -72,7 +72,7 @@ def at_pressures_of(first, second):
 
 def percentiles(states, strains, K):
     """{figure: 95th percentile} of strains (n, 6) and stiffness (n, 6, 6) against States."""
-    from reduced.judging import stiffness_error, strain_error, symmetric, tip_error
+    from pneunet.reduced.training.judging import stiffness_error, strain_error, symmetric, tip_error
 
     loaded, stiffness = states.pressure > 0, stiffness_error(states, symmetric(K))
     strain, tip = (error(states, strains)[loaded] for error in (strain_error, tip_error))

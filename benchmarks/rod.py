@@ -30,10 +30,10 @@ def best_seconds(call, calls):
 
 def four_segments():
     """A Rod of four segments of both kinds: the analytic model's free strains, the bare cores' stiffness."""
-    from geometry import Manipulator
-    from reduced import AnalyticModel, QuadraticLaw, Rod
-    from reduced.section_laws import passive_law
-    from tests.cases import CASES
+    from pneunet.geometry import Manipulator
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.reduced import AnalyticModel, QuadraticLaw, Rod
+    from pneunet.reduced.rod.laws import passive_law
 
     twist, bend = CASES["twist_w12"], CASES["one_sided_w10"]
     body = Manipulator((twist(60.0, 5), bend(60.0, 6), twist(120.0, 5), bend(90.0, 6)))
@@ -46,9 +46,10 @@ def four_segments():
 
 def speed():
     """The part `rod`."""
-    from base.strains import RodStrains
-    from geometry.loading import DeadLoads
-    from reduced import centreline, free_shapes
+    from pneunet.base.strains import RodStrains
+    from pneunet.geometry.loading import DeadLoads
+    from pneunet.reduced import free_shapes
+    from pneunet.reduced.rod import centreline
 
     rod, gravity = four_segments(), DeadLoads((0.0, 0.0, -9810.0))
     lengths, strains = rod.lengths, rod.free_strains
@@ -85,14 +86,14 @@ def compare(rod, loads, fe):
 def against_finite_elements():
     """The part `rod-fe`: laws from the unit cells' states, bodies of five chambers, one mesh size; beside it
     the trained law."""
-    from geometry import Manipulator
-    from geometry.loading import DeadLoads
-    from geometry.mesh import mesh_manipulator
-    from hifi.cell_run import solve_cell
-    from hifi.cellfile import CellCase
-    from hifi.manipulator import ManipulatorSolve
-    from reduced import QuadraticLaw, Rod, shipped_law
-    from tests.cases import CASES
+    from pneunet.geometry import Manipulator
+    from pneunet.geometry.cad.mesh import mesh_manipulator
+    from pneunet.geometry.loading import DeadLoads
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.hifi.body.manipulator import ManipulatorSolve
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.run import solve_cell
+    from pneunet.reduced import QuadraticLaw, Rod, shipped_law
 
     rows, trained = [], shipped_law()
     with tempfile.TemporaryDirectory() as folder:

@@ -15,8 +15,8 @@ STRAIN_MESH, STRAIN_PRESSURE = 1.0, 0.05
 
 
 def segment(chambers):
-    from base.materials import NeoHookean
-    from tests.cases import CASES
+    from pneunet.base.materials.laws import NeoHookean
+    from pneunet.geometry.reference_cases import CASES
 
     return CASES["one_sided_w10"](angle=60.0, chambers=chambers, material=NeoHookean(0.2068))
 
@@ -24,7 +24,7 @@ def segment(chambers):
 def walk(system, path, pressure, levels):
     """Process seconds a converged step in equal steps to `pressure`, the tangent factorised and measured
     nowhere but by Newton."""
-    from hifi.stepping import StepSize, run_steps
+    from pneunet.hifi.path.stepping import StepSize, run_steps
 
     step = pressure / levels
     begun = time.process_time()
@@ -36,11 +36,11 @@ def walk(system, path, pressure, levels):
 
 
 def cell_step(folder):
-    from geometry.cell import mesh_cell
-    from hifi.cell import CellProblem
-    from hifi.cell_system import CellSystem
-    from hifi.control import LoadControl
-    from hifi.path import EquilibriumPath
+    from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.hifi.cell.problem import CellProblem
+    from pneunet.hifi.cell.system import CellSystem
+    from pneunet.hifi.path.control import LoadControl
+    from pneunet.hifi.path.equilibrium import EquilibriumPath
 
     mesh_cell(segment(1), COST_MESH, folder / "cell.msh")
     system = CellSystem(CellProblem(segment(1), folder / "cell.msh"))
@@ -59,9 +59,9 @@ def segment_step(folder, chambers):
 
 
 def finite(folder, chambers, mesh_size):
-    from geometry import Manipulator
-    from geometry.mesh import mesh_manipulator
-    from hifi.manipulator import ManipulatorSolve
+    from pneunet.geometry import Manipulator
+    from pneunet.geometry.cad.mesh import mesh_manipulator
+    from pneunet.hifi.body.manipulator import ManipulatorSolve
 
     body = Manipulator((segment(chambers),))
     mesh_manipulator(body, mesh_size, folder / str(chambers))
@@ -71,8 +71,8 @@ def finite(folder, chambers, mesh_size):
 def middle(folder):
     """{pressure: (e (3,), k (3,))} over the two pitches around the middle chamber of the 9-chamber segment at
     STRAIN_MESH."""
-    from base import se3
-    from base.strains import RodStrains
+    from pneunet.base import se3
+    from pneunet.base.strains import RodStrains
 
     solve = finite(folder, CHAMBERS[0], STRAIN_MESH)
     stations = solve.sections.segment_stations[0]
@@ -95,8 +95,8 @@ def middle(folder):
 
 def against_segments():
     """The part `segments`: ({key: value}, details)."""
-    from hifi.cell_run import solve_cell
-    from hifi.cellfile import CellCase
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.run import solve_cell
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

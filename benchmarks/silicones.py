@@ -28,9 +28,9 @@ LEVELS = (0.05, 0.1, 0.15, 0.2)  # P/mu
 
 def free_strains(segment):
     """(levels, 6) free strains (e, k normal pitch) of FE at LEVELS."""
-    from geometry.shape_numbers import normal_pitch
-    from hifi.cell_run import solve_cell
-    from hifi.cellfile import CellCase
+    from pneunet.geometry.shape_numbers import normal_pitch
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.run import solve_cell
 
     states = []
     with tempfile.TemporaryDirectory() as folder:
@@ -45,8 +45,8 @@ def free_strains(segment):
 
 def silicones():
     """The part `silicones`."""
-    from base.materials import NeoHookean, Yeoh
-    from tests.cases import CASES
+    from pneunet.base.materials.laws import NeoHookean, Yeoh
+    from pneunet.geometry.reference_cases import CASES
 
     rows = []
     for name, angle in DESIGNS:

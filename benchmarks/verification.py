@@ -21,7 +21,7 @@ MANUFACTURED_MESHES = (2, 4, 8, 16)
 
 def verification():
     """The part `verification`: ({key: value}, details)."""
-    from tests.verification import cells, cook, energy_balance, exact_cases, land, manufactured, patch
+    from pneunet.hifi.verification import cells, cook, energy_balance, exact_cases, land, manufactured, patch
 
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
@@ -238,7 +238,7 @@ def _inflation_picture(d, path):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    from tests.verification import closed_forms
+    from pneunet.hifi.verification import closed_forms
 
     figure, axes = plt.subplots(figsize=(7, 4))
     a = np.linspace(1.0, 2.25, 200)

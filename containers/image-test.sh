@@ -19,8 +19,8 @@ say "doctor in the image"
 in_image "$out" pneunet doctor
 
 say "the reference case on 2 ranks, in the image and here"
-in_image "$out" sh -c 'cd /opt/pneunet && pneunet run -n 2 -- python -m tests.reference_case /data/image.json'
-.venv/bin/pneunet run -n 2 -- python -m tests.reference_case "$out/native.json"
+in_image "$out" sh -c 'cd /opt/pneunet && pneunet run -n 2 -- python -m pneunet.hifi.verification.reference_case /data/image.json'
+.venv/bin/pneunet run -n 2 -- python -m pneunet.hifi.verification.reference_case "$out/native.json"
 .venv/bin/python containers/compare.py "$out/native.json" "$out/image.json" --rtol 1e-6
 
 say "tests of the command line in the image"

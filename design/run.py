@@ -6,21 +6,21 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from base.errors import InputError
-from base.files import output_directory, require_writable, write_csv
-from base.record import write_record
-from design.doubts import WARN, told_doubts
-from design.extraction import extract
-from design.inverse import solve
-from design.metrics import compare
-from design.problem import OBJECTIVES, PAIRED
-from design.segmentation import NOTE, split
-from design.targetfile import POINT_COLUMNS, read_target
-from design.targets import HELICAL, TWISTING
-from geometry.designfile import Design, write_design
-from geometry.parameters import TWISTING as TWISTING_KIND
-from reduced.choice import choose_law
-from reduced.model import predict
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import output_directory, require_writable, write_csv
+from pneunet.base.files.record import write_record
+from pneunet.design.search.doubts import WARN, told_doubts
+from pneunet.design.search.inverse import solve
+from pneunet.design.search.problem import OBJECTIVES, PAIRED
+from pneunet.design.target.extraction import extract
+from pneunet.design.target.file import POINT_COLUMNS, read_target
+from pneunet.design.target.metrics import compare
+from pneunet.design.target.segmentation import NOTE, split
+from pneunet.design.target.target import HELICAL, TWISTING
+from pneunet.geometry.designfile import Design, write_design
+from pneunet.geometry.parameters import TWISTING as TWISTING_KIND
+from pneunet.reduced.choice import choose_law
+from pneunet.reduced.model import predict
 
 GIVEN_NOTE = "split given by the user"
 
@@ -152,7 +152,7 @@ def _rates(table):
 
 def _draw(directory, say):
     try:
-        from design.pictures import draw_design
+        from pneunet.design.report.pictures import draw_design
 
         draw_design(directory)
     except ImportError:

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from base.errors import ConvergenceError, InputError
-from base.files import atomic_path, output_directory, write_csv
-from base.record import write_record
-from design.doubts import WARN, told_doubts
-from design.labels import plain
-from geometry.designfile import read_design
-from reduced.choice import choose_law
-from reduced.model import predict
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.files.atomic import atomic_path, output_directory, write_csv
+from pneunet.base.files.record import write_record
+from pneunet.design.report.labels import plain
+from pneunet.design.search.doubts import WARN, told_doubts
+from pneunet.geometry.designfile import read_design
+from pneunet.reduced.choice import choose_law
+from pneunet.reduced.model import predict
 
 FRAMES = 24
 FRAME_PIXELS = (540, 432)
@@ -82,8 +82,8 @@ def _list(pressures):
 
 
 def _pictures(design, shapes, law, folder, say):
-    from base.rendering import view_of
-    from design.bodies import body_mesh
+    from pneunet.base.pictures.rendering import view_of
+    from pneunet.design.report.bodies import body_mesh
 
     bodies = {p: body_mesh(design.manipulator, p, law, design.base_pose) for p in shapes}
     for p, body in bodies.items():
@@ -101,8 +101,8 @@ def _pictures(design, shapes, law, folder, say):
 
 def _picture_of_all(design, view, bodies, path):
     """One panel a pressure, same camera and scale."""
-    from base.rendering import figure, render, save, show
-    from design.bodies import painted
+    from pneunet.base.pictures.rendering import figure, render, save, show
+    from pneunet.design.report.bodies import painted
 
     columns = min(len(bodies), 3)
     rows = -(-len(bodies) // columns)
@@ -134,8 +134,8 @@ def _animation(design, highest, law, path):
     """A GIF that inflates to `highest` (MPa) and holds; 24 frames of a few kB each."""
     from PIL import Image, ImageDraw
 
-    from base.rendering import render, view_of
-    from design.bodies import body_mesh, painted
+    from pneunet.base.pictures.rendering import render, view_of
+    from pneunet.design.report.bodies import body_mesh, painted
 
     pressures = highest * np.linspace(0, 1, FRAMES)
     bodies = [body_mesh(design.manipulator, p, law, design.base_pose) for p in pressures]

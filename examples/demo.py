@@ -27,7 +27,7 @@ def main():
     design = str(OUT / "design.toml")
     # an earlier design's, perhaps an earlier version's
     shutil.rmtree(ROOT / OUT / "solve", ignore_errors=True)
-    step("design", "examples/targets/octopus.toml", "-o", str(OUT))
+    step("design", "design/data/octopus.toml", "-o", str(OUT))
     step("shape", design)
     step("mesh", design)
     # a load that cannot be reached leaves the result up to there, and the report says so

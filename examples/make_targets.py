@@ -1,4 +1,4 @@
-"""Regenerate examples/targets/*.csv from their numbers: `python -m examples.make_targets [FOLDER]`.
+"""Regenerate design/data/*.csv from their numbers: `python -m examples.make_targets [FOLDER]`.
 
 octopus and tentacle2 are rods of piecewise uniform twist and curvature (per *deformed* length); octopus is
 the paper's (Jiang et al. 2021, Sec. IV D). vase and pear are wraps of a surface of revolution, for which the
@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from base import se3
-from base.files import write_text
-from base.strains import helix_frenet
+from pneunet.base import se3
+from pneunet.base.files.atomic import write_text
+from pneunet.base.strains import helix_frenet
 
 POINTS = 201
 #: points on a wrap before it is sampled evenly; its chords then miss arc length by less than 1e-6 mm

@@ -1,6 +1,6 @@
 """What is built: pneu-net segments and manipulators as parameters, CAD, meshes. The CAD modules import
 gmsh."""
 
-from geometry.parameters import Manipulator, Segment
+from pneunet.geometry.parameters import Manipulator, Segment
 
 __all__ = ["Manipulator", "Segment"]

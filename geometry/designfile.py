@@ -4,11 +4,19 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from base.errors import InputError
-from base.files import write_text
-from base.materials import material_from_table, material_to_table
-from base.tables import as_table, from_table, number, read_toml, refuse_unknown, to_table, toml_text
-from geometry.loading import (
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import write_text
+from pneunet.base.files.toml import (
+    as_table,
+    from_table,
+    number,
+    read_toml,
+    refuse_unknown,
+    to_table,
+    toml_text,
+)
+from pneunet.base.materials.laws import material_from_table, material_to_table
+from pneunet.geometry.loading import (
     CONTACTS,
     CONTROL_KEYS,
     Control,
@@ -18,7 +26,7 @@ from geometry.loading import (
     read_control,
     read_extras,
 )
-from geometry.parameters import Manipulator, Segment
+from pneunet.geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
 KEYS = [

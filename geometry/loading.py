@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from base.errors import InputError
-from base.tables import as_table, file_key, number, quantity, refuse_unknown, to_table
+from pneunet.base.errors import InputError
+from pneunet.base.files.toml import as_table, file_key, number, quantity, refuse_unknown, to_table
 
 CONTROLS = ("pressure", "volume", "arc length")
 
@@ -109,7 +109,7 @@ def read_contact(table, where):
 
 @dataclass(frozen=True)
 class Extras:
-    """What is computed at the end beside the shape; see hifi.tip."""
+    """What is computed at the end beside the shape; see hifi.body.tip."""
 
     tip_stiffness: bool = False
     blocked_force: bool = False

@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from base.errors import InputError
-from base.materials import Hyperelastic, NeoHookean
-from base.tables import quantity
+from pneunet.base.errors import InputError
+from pneunet.base.files.toml import quantity
+from pneunet.base.materials.laws import Hyperelastic, NeoHookean
 
 ONE_SIDED, TWISTING = "one-sided", "twisting"
 KINDS = (ONE_SIDED, TWISTING)

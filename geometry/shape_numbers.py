@@ -6,7 +6,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from geometry.parameters import ONE_SIDED, TWISTING, Segment
+from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 
 #: Segment's attributes in order: the angle in degrees, then lengths
 SHAPE = (
@@ -16,7 +16,7 @@ SHAPE = (
 _dimensions = attrgetter(*SHAPE)
 #: kind -> name -> changes of SHAPE by one: the directions in which designs differ when the normal pitch is
 #: the unit of length. Walls and cavities grow at the gap's cost; what a campaign ties together
-#: (hifi.campaign_sample) moves together
+#: (hifi.runs.campaign.sample) moves together
 _OF_BOTH = {
     "angle": {"angle": 1.0},
     "width": {"width": 1.0},

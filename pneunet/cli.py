@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-from base.errors import ConvergenceError, InputError
+from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.launch import RANK_VARIABLES, rank_map
 
 
@@ -286,16 +286,16 @@ def design_folder(arguments):
 
 
 def run_design(a):
-    from design.run import run_design as work
-    from reduced.choice import choose_law
+    from pneunet.design.run import run_design as work
+    from pneunet.reduced.choice import choose_law
 
     work(a.target, a.output or Path("out") / a.target.stem, choose_law(a.law), say=say, outside=a.outside)
 
 
 def run_shape(a):
-    from design.shape import run_shape as work
-    from geometry.designfile import read_design
-    from reduced.choice import choose_law
+    from pneunet.design.shape import run_shape as work
+    from pneunet.geometry.designfile import read_design
+    from pneunet.reduced.choice import choose_law
 
     top = read_design(a.design).pressure
     work(
@@ -309,9 +309,9 @@ def run_shape(a):
 
 
 def run_mesh(a):
-    from base.files import output_directory
-    from geometry.designfile import read_design
-    from geometry.mesh import mesh_manipulator
+    from pneunet.base.files.atomic import output_directory
+    from pneunet.geometry.cad.mesh import mesh_manipulator
+    from pneunet.geometry.designfile import read_design
 
     design = read_design(a.design)
     folder = output_directory(design_folder(a)) / "mesh"
@@ -320,10 +320,10 @@ def run_mesh(a):
 
 
 def run_solve(a):
-    from geometry.designfile import read_design
+    from pneunet.geometry.designfile import read_design
 
     design = read_design(a.design)
-    from hifi.manipulator_run import solve_design
+    from pneunet.hifi.runs.solve.solve import solve_design
 
     solve_design(
         design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume
@@ -331,19 +331,19 @@ def run_solve(a):
 
 
 def run_cell(a):
-    from hifi.cell_run import run_cell as work
+    from pneunet.hifi.cell.run import run_cell as work
 
     work(a.cell, a.output or a.cell.parent, say=say)
 
 
 def run_study(a):
-    from hifi.study import run_study as work
+    from pneunet.hifi.runs.study.study import run_study as work
 
     work(a.study, a.output or Path("out") / a.study.stem, say=say, retry=a.retry)
 
 
 def run_campaign(a):
-    from hifi.campaign import run_campaign as work
+    from pneunet.hifi.runs.campaign.campaign import run_campaign as work
 
     work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry, extend=a.extend)
 
@@ -351,10 +351,10 @@ def run_campaign(a):
 def run_suggest(a):
     import numpy as np
 
-    from geometry.shape_numbers import shape_numbers
-    from hifi.campaignfile import on_offer, read_campaign
-    from reduced.choice import choose_law
-    from reduced.suggestion import most_telling
+    from pneunet.geometry.shape_numbers import shape_numbers
+    from pneunet.hifi.runs.campaign.file import on_offer, read_campaign
+    from pneunet.reduced.choice import choose_law
+    from pneunet.reduced.training.suggestion import most_telling
 
     campaign, law = read_campaign(a.campaign), choose_law(a.law)
     known = getattr(law, "kinds", {})
@@ -370,7 +370,7 @@ def run_suggest(a):
 
 
 def run_train(a):
-    from reduced.training import run_training
+    from pneunet.reduced.training.train import run_training
 
     with rank_map() as mapping:
         if mapping:  # other ranks have worked for this one
@@ -380,14 +380,14 @@ def run_train(a):
 
 
 def run_report(a):
-    from design.report import write_report
-    from reduced.choice import choose_law
+    from pneunet.design.report.report import write_report
+    from pneunet.reduced.choice import choose_law
 
     write_report(a.directory, say, choose_law(a.law) if a.law else None)
 
 
 def run_fit_material(a):
-    from base.fit_material import run_fit
+    from pneunet.base.materials.fit_run import run_fit
 
     run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100, say=say)
 

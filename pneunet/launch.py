@@ -12,7 +12,7 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
-from base.processes import end_with_parent, environment_without_launcher
+from pneunet.base.system.processes import end_with_parent, environment_without_launcher
 
 #: what MPI launchers tell a process of its rank
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")

@@ -3,9 +3,9 @@
 from functools import lru_cache
 from pathlib import Path
 
-from base.errors import InputError
-from reduced.law import read_law
-from reduced.model import AnalyticModel
+from pneunet.base.errors import InputError
+from pneunet.reduced.model import AnalyticModel
+from pneunet.reduced.trained.law import read_law
 
 DATA = Path(__file__).resolve().parent / "data"
 #: how both are made: docs/rod-law.md

@@ -6,14 +6,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from base.errors import ConvergenceError, InputError
-from base.strains import RodStrains
-from geometry.parameters import TWISTING
-from reduced.centreline import centreline
-from reduced.ends import free_manipulator
-from reduced.helical import HelicalCell
-from reduced.section import equivalent_radii
-from reduced.twisting import TwistingTube
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.strains import RodStrains
+from pneunet.geometry.parameters import TWISTING
+from pneunet.reduced.analytic.helical import HelicalCell
+from pneunet.reduced.analytic.twisting import TwistingTube
+from pneunet.reduced.rod.areas import equivalent_radii
+from pneunet.reduced.rod.centreline import centreline
+from pneunet.reduced.rod.ends import free_manipulator
 
 
 class SegmentLaw(ABC):
@@ -113,7 +113,7 @@ def _twisting_law(segment):
 
 def predict(manipulator, pressure, law, spacing=1.0, base_pose=None):
     """The Centreline of a free manipulator at `pressure` (MPa) by a SegmentLaw, end effects included
-    (reduced.ends).
+    (reduced.rod.ends).
 
     spacing in mm; base_pose (4, 4) the base frame, default the identity.
     """

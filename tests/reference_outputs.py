@@ -1,6 +1,6 @@
 """Numbers that no move of code may change: `python -m tests.reference_outputs OUT.json` writes them.
 
-tests/data/reference_outputs.json was written before the packages were moved under one name.
+hifi/verification/data/reference_outputs.json was written before the packages were moved under one name.
 """
 
 import json
@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from base.materials import NeoHookean
-from geometry import Manipulator, Segment
-from reduced import choose_law, predict
-from reduced.choice import DATA_SET
-from tests.cases import CASES
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.reference_cases import CASES
+from pneunet.reduced import choose_law, predict
+from pneunet.reduced.choice import DATA_SET
 
 STORED = Path(__file__).resolve().parent / "data" / "reference_outputs.json"
 #: (case, angle in degrees) of the free strains, and pressures in kPa
@@ -63,16 +63,16 @@ def centrelines():
 
 def held_out_figures():
     """{kind: {figure: number}} of the shipped law on the held-out designs."""
-    from base.dataset import read_dataset
-    from reduced.training import held_out_figures, samples_of
+    from pneunet.base.files.dataset import read_dataset
+    from pneunet.reduced.training.train import held_out_figures, samples_of
 
     return held_out_figures(choose_law().kinds, samples_of(read_dataset(DATA_SET)))
 
 
 def cell():
     """A unit cell of 3 mm at 20 kPa: strains, volume (mm3) and stiffness (N, N mm, N mm2)."""
-    from hifi.cell_run import solve_cell
-    from hifi.cellfile import CellCase
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.run import solve_cell
 
     with tempfile.TemporaryDirectory() as folder:
         state, _ = solve_cell(
@@ -83,8 +83,8 @@ def cell():
 
 
 def body():
-    """tests.reference_case on two ranks."""
-    from tests import reference_case
+    """pneunet.hifi.verification.reference_case on two ranks."""
+    from pneunet.hifi.verification import reference_case
 
     with tempfile.TemporaryDirectory() as folder:
         return reference_case.on_ranks(2, Path(folder) / "body.json")

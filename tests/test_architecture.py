@@ -1,8 +1,9 @@
-"""The house keeps its floors: who may import whom, and what must work on numpy and scipy alone."""
+"""The house keeps its floors and rooms: who may import whom, and what must work on numpy and scipy alone."""
 
 import ast
 import subprocess
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,24 @@ FLOORS = {
     "design": {"design", "reduced", "geometry", "base"},
     "pneunet": set(PACKAGES),
 }
+#: rooms of a package from the ground up: a room's modules may import those of its own storey and below; "" is
+#: what lies in the package itself
+ROOMS = {
+    "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
+    "geometry": [{""}, {"cad"}],
+    "hifi": [
+        {"fem"},
+        {"path"},
+        {"contact"},
+        {"cell", "body"},
+        {"runs"},
+        {"runs/solve", "runs/campaign"},
+        {"runs/study"},
+        {"verification"},
+    ],
+    "reduced": [{"rod"}, {"analytic", "trained"}, {""}, {"training"}],
+    "design": [{"target"}, {"search"}, {"report"}, {""}],
+}
 #: what only these packages' modules may import; all else (matplotlib, pyvista) is for the inside of functions
 SOLVERS = {"dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"}
 LIBRARIES = {
@@ -27,24 +46,23 @@ LIBRARIES = {
     "hifi": {"numpy", "scipy", *SOLVERS},
     "reduced": {"numpy", "scipy"},
     "design": {"numpy", "scipy"},
-    "pneunet": set(),
+    "pneunet": {"numpy"},
 }
 #: the one module of design that may reach hifi, inside its functions
-VERIFICATION = "design/verification.py"
+CHAIN = "design/chain.py"
 NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
-BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py"}
-BLOCKED |= {"vtk", "vtkmodules", "pyvista", "matplotlib", "PIL", "hifi"}
+BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
 
 class Blocker:
     def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] in BLOCKED:
+        if name.split(".")[0] in BLOCKED or name.startswith("pneunet.hifi"):
             raise ImportError(f"{name} is blocked")
 
 sys.meta_path.insert(0, Blocker())
-names = ["geometry.parameters", "geometry.designfile"]
-for package in ("base", "reduced", "design"):
+names = ["pneunet.geometry.parameters", "pneunet.geometry.designfile", "pneunet.geometry.loading"]
+for package in ("pneunet.base", "pneunet.reduced", "pneunet.design"):
     folder = importlib.import_module(package).__path__
     names += [package] + [m.name for m in pkgutil.walk_packages(folder, package + ".")]
 public = 0
@@ -58,9 +76,8 @@ print(len(names), public)
 
 
 def test_everything_but_finite_elements_and_cad_needs_numpy_and_scipy_alone():
-    done = subprocess.run(
-        [sys.executable, "-c", NUMPY_AND_SCIPY_ALONE], capture_output=True, text=True, cwd=ROOT
-    )
+    command = [sys.executable, "-c", NUMPY_AND_SCIPY_ALONE]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stderr
     modules, public = map(int, done.stdout.split())
     assert modules >= 30 and public >= 200
@@ -72,17 +89,15 @@ def imported(path):
 
     def visit(node, at_import):
         for child in ast.iter_child_nodes(node):
+            here = at_import
+            if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
+                here = False
             if isinstance(child, ast.Import):
-                found.extend((alias.name, child.lineno, at_import) for alias in child.names)
+                found.extend((alias.name, child.lineno, here) for alias in child.names)
             elif isinstance(child, ast.ImportFrom):
                 assert child.level == 0, f"{path}:{child.lineno}: relative import"
-                found.extend(
-                    (f"{child.module}.{alias.name}", child.lineno, at_import) for alias in child.names
-                )
-            visit(
-                child,
-                at_import and not isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)),
-            )
+                found.extend((f"{child.module}.{alias.name}", child.lineno, here) for alias in child.names)
+            visit(child, here and not isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)))
 
     visit(ast.parse(path.read_text()), True)
     return found
@@ -92,37 +107,67 @@ def relative(path):
     return path.relative_to(ROOT).as_posix()
 
 
+def module_name(path):
+    """Import name of a file: the folders at the top hang under `pneunet`."""
+    parts = list(path.relative_to(ROOT).with_suffix("").parts)
+    parts = parts[:-1] if parts[-1] == "__init__" else parts
+    return ".".join(parts if parts[0] == "pneunet" else ["pneunet", *parts])
+
+
+MODULES = {module_name(path): path for path in FILES}
+
+
+def own(name):
+    """(package, file) of an imported name, the longest of its parts that is a module; None for others'."""
+    while name and name not in MODULES:
+        name = name.rpartition(".")[0]
+    return (MODULES[name].relative_to(ROOT).parts[0], MODULES[name]) if name else None
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_floors(package):
     wrong = []
     for path in (ROOT / package).rglob("*.py"):
         for name, line, at_import in imported(path):
-            top = name.split(".")[0]
-            allowed = FLOORS[package]
-            if relative(path) == VERIFICATION and not at_import:
+            found, allowed = own(name), FLOORS[package]
+            if relative(path) == CHAIN and not at_import:
                 allowed = allowed | {"hifi"}
-            if top in PACKAGES and top not in allowed:
+            if found and found[0] not in allowed:
                 wrong.append(f"{relative(path)}:{line}: {package} must not import {name}")
-            elif (
-                top not in PACKAGES and at_import and top not in LIBRARIES[package] | sys.stdlib_module_names
-            ):
+            top = name.split(".")[0]
+            if not found and at_import and top not in LIBRARIES[package] | sys.stdlib_module_names:
                 wrong.append(f"{relative(path)}:{line}: {name} belongs inside a function")
     assert wrong == []
 
 
-def module_name(path):
-    parts = list(path.relative_to(ROOT).with_suffix("").parts)
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+def room(path, package):
+    return path.parent.relative_to(ROOT / package).as_posix().replace(".", "", 1)
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_no_arrow_runs_up_between_rooms(package):
+    storey = {name: number for number, names in enumerate(ROOMS[package]) for name in names}
+    wrong = []
+    for path in (ROOT / package).rglob("*.py"):
+        here = room(path, package)
+        if path.name == "__init__.py":
+            continue
+        for name, line, _ in imported(path):
+            found = own(name)
+            if not found or found[0] != package:
+                continue
+            there = room(found[1], package)
+            if storey[there] > storey[here] or (storey[there] == storey[here] and there != here):
+                wrong.append(f"{relative(path)}:{line}: {here or package} must not import {name}")
+    assert wrong == []
 
 
 def test_no_module_imports_itself_through_others():
-    """At import time, counting only what a module names: packages' own __init__ stay out unless they are
-    named."""
-    modules = {module_name(path): path for path in FILES}
+    """At import time, counting what a module names: packages' own __init__ stay out unless they are named."""
     uses = {}
-    for name, path in modules.items():
+    for name, path in MODULES.items():
         named = {n for n, _, at_import in imported(path) if at_import}
-        uses[name] = {m if m in modules else m.rpartition(".")[0] for m in named} & set(modules) - {name}
+        uses[name] = {m if m in MODULES else m.rpartition(".")[0] for m in named} & set(MODULES) - {name}
     done, trail = set(), []
 
     def walk(name):
@@ -135,7 +180,7 @@ def test_no_module_imports_itself_through_others():
         trail.pop()
         done.add(name)
 
-    for name in modules:
+    for name in MODULES:
         walk(name)
 
 
@@ -147,3 +192,12 @@ def test_modules_are_rooms_not_halls(path):
     assert len(text.splitlines()) <= 400
     assert ast.get_docstring(tree)
     assert not [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Global)]
+
+
+def test_no_two_public_classes_share_a_name():
+    places = defaultdict(list)
+    for path in FILES:
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].append(relative(path))
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}

@@ -29,13 +29,13 @@ def square(inputs, directory):
 
 
 def ends_short(inputs, directory):
-    from base.errors import ConvergenceError
+    from pneunet.base.errors import ConvergenceError
 
     raise ConvergenceError("stopped at 3 kPa")
 
 
 def refuses(inputs, directory):
-    from base.errors import InputError
+    from pneunet.base.errors import InputError
 
     raise InputError("x must be even")
 
@@ -83,8 +83,8 @@ def initialises_mpi(inputs, directory):
 def main(directory, which, *options):
     from mpi4py import MPI
 
-    from base.processes import Limits
-    from hifi.cases import Case, run_cases
+    from pneunet.base.system.processes import Limits
+    from pneunet.hifi.runs.cases import Case, run_cases
 
     files = {"journal": f"{directory}.journal", "grandchild": f"{directory}.grandchild"}
     cases = {

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from base.files import atomic_path
+from pneunet.base.files.atomic import atomic_path
 
 
 def segment():
     """Case twist-w12, 60 degrees, three pairs of chambers."""
-    from geometry import Manipulator
-    from tests.cases import CASES
+    from pneunet.geometry import Manipulator
+    from pneunet.geometry.reference_cases import CASES
 
     return Manipulator((CASES["twist_w12"](angle=60.0, chambers=3),))
 
@@ -24,7 +24,7 @@ def make(directory, mesh_size, manipulator=None):
     vertices are a facet of that surface, all of positive volume, and the rules with which ours integrates:
     volume_points (q, 3), volume_weights, facet_points (q, 2), facet_weights on the unit simplices.
     """
-    from geometry.mesh import mesh_manipulator, segment_tables
+    from pneunet.geometry.cad.mesh import mesh_manipulator, segment_tables
 
     directory, manipulator = Path(directory), manipulator or segment()
     facts = directory / "mesh.json"
@@ -45,7 +45,7 @@ def arrays(path):
     """What mesh.npz holds, of a gmsh file."""
     import gmsh
 
-    from geometry import cad
+    from pneunet.geometry.cad import body as cad
 
     gmsh.initialize()
     try:
@@ -84,8 +84,8 @@ def owners(tets, facets):
 def rules():
     from basix import CellType, make_quadrature
 
-    from hifi.loads import PRESSURE_DEGREE
-    from hifi.problem import VOLUME_DEGREE
+    from pneunet.hifi.body.problem import VOLUME_DEGREE
+    from pneunet.hifi.fem.loads import PRESSURE_DEGREE
 
     volume = make_quadrature(CellType.tetrahedron, VOLUME_DEGREE)
     facet = make_quadrature(CellType.triangle, PRESSURE_DEGREE)

@@ -7,14 +7,14 @@ import numpy as np
 from mpi4py import MPI
 from ramp import MILESTONES, MPA, MU, Body
 
-from base.materials import NeoHookean
 from benchmarks.rivals.meshes import segment
-from geometry import cad
-from hifi import compat
-from hifi.loads import Pressure
-from hifi.manipulator import ManipulatorSolve
-from hifi.problem import MixedProblem, Support
-from hifi.solver import DirectSolver
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry.cad import body as cad
+from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.body.problem import MixedProblem, Support
+from pneunet.hifi.fem import compat
+from pneunet.hifi.fem.loads import Pressure
+from pneunet.hifi.fem.solver import DirectSolver
 
 
 class OurBody(Body):

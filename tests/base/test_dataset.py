@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base.dataset import SCHEMA, UPPER, CellData, columns, read_dataset, write_dataset
-from base.datasheet import datasheet
-from base.errors import InputError
+from pneunet.base.errors import InputError
+from pneunet.base.files.dataset import SCHEMA, UPPER, CellData, columns, read_dataset, write_dataset
+from pneunet.base.files.datasheet import datasheet
 
 
 @pytest.fixture

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.files import (
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import (
     atomic_path,
     output_directory,
     read_columns,

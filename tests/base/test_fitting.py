@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.fit_material import run_fit
-from base.fitting import TensileData, fit
-from base.hyperelastic import nominal_stress
-from base.materials import LAWS, Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh, material_from_table
-from base.tables import read_toml
-from base.tensile import Specimen, read_tensile
+from pneunet.base.errors import InputError
+from pneunet.base.files.toml import read_toml
+from pneunet.base.materials.fit_run import run_fit
+from pneunet.base.materials.fitting import TensileData, fit
+from pneunet.base.materials.hyperelastic import nominal_stress
+from pneunet.base.materials.laws import LAWS, Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh, material_from_table
+from pneunet.base.materials.tensile import Specimen, read_tensile
 
 
 def measured(material, largest=3.0, noise=0.0, points=150):

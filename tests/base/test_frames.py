@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from base import se3
-from base.frames import FitMoments, best_rigid_fit, frame_at
+from pneunet.base import se3
+from pneunet.base.frames import FitMoments, best_rigid_fit, frame_at
 
 RANDOM = np.random.default_rng(2)
 POINTS = RANDOM.uniform(-3, 3, (40, 3)) + [20.0, 0.0, 0.0]

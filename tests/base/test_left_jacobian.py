@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from base import se3
-from base.left_jacobian import LeftJacobian, adjoint, commutator, wrench_commutator
+from pneunet.base import se3
+from pneunet.base.left_jacobian import LeftJacobian, adjoint, commutator, wrench_commutator
 
 RNG = np.random.default_rng(3)
 

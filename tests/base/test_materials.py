@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.hyperelastic import MODES, nominal_stress, shear_stress, stable_stretch
-from base.materials import (
+from pneunet.base.errors import InputError
+from pneunet.base.materials.hyperelastic import MODES, nominal_stress, shear_stress, stable_stretch
+from pneunet.base.materials.laws import (
     Gent,
     MooneyRivlin,
     NeoHookean,
@@ -19,7 +19,7 @@ from base.materials import (
     material_to_table,
     silicone,
 )
-from base.silicones import BULLETINS
+from pneunet.base.materials.silicones import BULLETINS
 
 LAWS = [
     NeoHookean(0.3, elongation_at_break=4.0),

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from base import record
+from pneunet.base.files import record
 
 
 def test_record_holds_how_and_what(tmp_path, monkeypatch):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from base import se3
+from pneunet.base import se3
 
 RANDOM = np.random.default_rng(1)
 AXES = [[1, 0, 0], [0, -1, 0], [0.6, -0.48, 0.64]]

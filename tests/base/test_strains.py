@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import Chebyshev
 
-from base import se3
-from base.strains import RodStrains, helix_frenet
+from pneunet.base import se3
+from pneunet.base.strains import RodStrains, helix_frenet
 
 SCREWS = [
     ([1.0, 0.0, 0.0], [0.02, 0.03, 0.0]),

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.materials import PAPER_HELICAL, NeoHookean, material_from_table, material_to_table
-from base.tables import from_table, quantity, read_toml, refuse_unknown, to_table, toml_text
+from pneunet.base.errors import InputError
+from pneunet.base.files.toml import from_table, quantity, read_toml, refuse_unknown, to_table, toml_text
+from pneunet.base.materials.laws import PAPER_HELICAL, NeoHookean, material_from_table, material_to_table
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """One consistent system: mm, N, MPa, tonne, s."""
 
-from base import units
+from pneunet.base import units
 
 
 def test_factors_make_one_system():

@@ -5,11 +5,11 @@ import json
 
 import numpy as np
 
-from base.files import write_csv
-from base.strains import RodStrains
-from geometry.designfile import Design, body_tables, write_design
-from geometry.parameters import Manipulator, Segment
-from reduced.model import AnalyticModel, predict
+from pneunet.base.files.atomic import write_csv
+from pneunet.base.strains import RodStrains
+from pneunet.geometry.designfile import Design, body_tables, write_design
+from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.reduced.model import AnalyticModel, predict
 
 FACTOR = 0.8
 POSE = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, -3.0], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])

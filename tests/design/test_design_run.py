@@ -3,15 +3,15 @@ import json
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.files import read_columns
-from design.comparison import Comparison
-from design.metrics import compare
-from design.run import run_design
-from design.rundata import read_run
-from geometry.designfile import read_design
-from geometry.parameters import Manipulator, Segment
-from reduced.model import predict
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import read_columns
+from pneunet.design.report.comparison import Comparison
+from pneunet.design.report.rundata import read_run
+from pneunet.design.run import run_design
+from pneunet.design.target.metrics import compare
+from pneunet.geometry.designfile import read_design
+from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.reduced.model import predict
 from tests.design.toy_law import ToyLaw
 
 POINTS = ("x_mm", "y_mm", "z_mm")

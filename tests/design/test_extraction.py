@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base import se3
-from base.strains import helix_frenet
-from design.extraction import extract, fit_arc, turn_about_axis
-from design.segmentation import split
-from design.targetfile import SHIPPED, read_target
-from design.targets import Piece, Target
+from pneunet.base import se3
+from pneunet.base.strains import helix_frenet
+from pneunet.design.target.extraction import extract, fit_arc, turn_about_axis
+from pneunet.design.target.file import SHIPPED, read_target
+from pneunet.design.target.segmentation import split
+from pneunet.design.target.target import Piece, Target
 
 
 def rod(*pieces, spacing=1.0):

@@ -3,17 +3,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base import se3
-from base.errors import ConvergenceError, InputError
-from design.extraction import extract
-from design.inverse import solve
-from design.lookup import count_for
-from design.metrics import compare
-from design.problem import EQ27
-from design.space import Variable
-from design.targets import Piece, Target
-from geometry.parameters import Manipulator, Segment
-from reduced.model import predict
+from pneunet.base import se3
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.design.search.inverse import solve
+from pneunet.design.search.lookup import count_for
+from pneunet.design.search.problem import EQ27
+from pneunet.design.search.space import Variable
+from pneunet.design.target.extraction import extract
+from pneunet.design.target.metrics import compare
+from pneunet.design.target.target import Piece, Target
+from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.reduced.model import predict
 from tests.design.toy_law import ToyLaw
 
 TWISTING = Segment("twisting", 65.0, 7, gap=2.2, cavity_floor=0.5, chamber_height=5.5)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from design.metrics import compare, eq27, hausdorff, paired_rms
+from pneunet.design.target.metrics import compare, eq27, hausdorff, paired_rms
 
 
 def line(length, offset=0.0, n=50):

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from base.errors import ConvergenceError, InputError
-from base.files import read_columns
-from design.dimensions import spread
-from design.drawing import chamber_plan, section_groups, segment_table
-from design.labels import plain, segment_name, significant
-from geometry.designfile import Design
-from geometry.parameters import Manipulator, Segment
-from reduced.model import AnalyticModel
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.files.atomic import read_columns
+from pneunet.design.report.dimensions import spread
+from pneunet.design.report.drawing import chamber_plan, section_groups, segment_table
+from pneunet.design.report.labels import plain, segment_name, significant
+from pneunet.geometry.designfile import Design
+from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.reduced.model import AnalyticModel
 from tests.design.fake_run import HELIX, PLANE, POSE, TWIST, make_run
 
 
@@ -66,7 +66,7 @@ def test_drawing_keeps_every_text_on_the_sheet_and_apart(segments):
     pytest.importorskip("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from design.drawing import drawing_figure
+    from pneunet.design.report.drawing import drawing_figure
 
     figure = drawing_figure(Design(Manipulator(segments), 0.05, name="arm"))
     renderer = FigureCanvasAgg(figure).get_renderer()
@@ -87,7 +87,7 @@ def test_drawing_keeps_every_text_on_the_sheet_and_apart(segments):
 
 def test_view_holds_all_points_and_is_orthonormal():
     pytest.importorskip("matplotlib")
-    from base.rendering import PIXELS, view_of
+    from pneunet.base.pictures.rendering import PIXELS, view_of
 
     points = np.random.default_rng(1).normal(size=(50, 3)) * [80, 20, 10]
     view = view_of(points)
@@ -101,7 +101,7 @@ def test_view_holds_all_points_and_is_orthonormal():
 
 def test_rendered_scale_is_the_views_scale():
     pyvista = pytest.importorskip("pyvista")
-    from base.rendering import render, view_of
+    from pneunet.base.pictures.rendering import render, view_of
 
     view = view_of(np.array([[-30.0, 0, 0], [30, 0, 0], [0, 20, 20]]))
     image = render(
@@ -119,7 +119,7 @@ def test_rendered_scale_is_the_views_scale():
 
 def test_design_picture(tmp_path):
     pytest.importorskip("matplotlib")
-    from design.pictures import draw_design
+    from pneunet.design.report.pictures import draw_design
 
     make_run(tmp_path, solve=False)
     assert draw_design(tmp_path).stat().st_size > 20_000
@@ -129,7 +129,7 @@ def test_design_picture(tmp_path):
 
 def test_shape_files(tmp_path):
     pytest.importorskip("pyvista")
-    from design.shape import run_shape
+    from pneunet.design.shape import run_shape
 
     make_run(tmp_path, solve=False)
     folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, lambda text: None, AnalyticModel())
@@ -158,7 +158,7 @@ class Limited(AnalyticModel):
 
 def test_shape_beyond_the_limit_keeps_and_names_the_rest(tmp_path):
     pytest.importorskip("pyvista")
-    from design.shape import run_shape
+    from pneunet.design.shape import run_shape
 
     make_run(tmp_path, (PLANE,), pressure=0.01, solve=False)
     with pytest.raises(ConvergenceError, match=r"no shape at 20 kPa.*kept in .*: 10 kPa"):
@@ -167,7 +167,7 @@ def test_shape_beyond_the_limit_keeps_and_names_the_rest(tmp_path):
 
 
 def test_shape_refuses_bad_pressures(tmp_path):
-    from design.shape import run_shape
+    from pneunet.design.shape import run_shape
 
     make_run(tmp_path, (PLANE,), solve=False)
     for pressures in ([], [-0.01], [float("nan")], [50.0]):

@@ -5,13 +5,13 @@ import re
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.files import read_columns
-from base.se3 import transform
-from design.comparison import Comparison, overlaps, smooth, stopped_short, verdict
-from design.metrics import compare
-from design.rundata import read_run
-from reduced.model import AnalyticModel
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import read_columns
+from pneunet.base.se3 import transform
+from pneunet.design.report.comparison import Comparison, overlaps, smooth, stopped_short, verdict
+from pneunet.design.report.rundata import read_run
+from pneunet.design.target.metrics import compare
+from pneunet.reduced.model import AnalyticModel
 from tests.design.fake_run import FACTOR, HELIX, PLANE, POSE, make_run
 
 
@@ -99,7 +99,7 @@ def test_rest_state_alone_is_no_solution(tmp_path):
 
 def test_report_page_is_whole_and_self_contained(tmp_path):
     pytest.importorskip("pyvista")
-    from design.report import write_report
+    from pneunet.design.report.report import write_report
 
     make_run(tmp_path, overlap=0.13)
     page = write_report(tmp_path, say=lambda text: None).read_text()
@@ -126,7 +126,7 @@ def test_report_page_is_whole_and_self_contained(tmp_path):
 
 def test_report_of_a_design_alone_says_what_is_missing(tmp_path):
     pytest.importorskip("pyvista")
-    from design.report import write_report
+    from pneunet.design.report.report import write_report
 
     make_run(tmp_path, solve=False)
     page = write_report(tmp_path, say=lambda text: None).read_text()

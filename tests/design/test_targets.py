@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from design.targetfile import SHIPPED, read_target
 from examples import make_targets
+from pneunet.base.errors import InputError
+from pneunet.design.target.file import SHIPPED, read_target
 
 GOOD = "x_mm,y_mm,z_mm\n" + "".join(f"{10 * i},0,0\n" for i in range(6))
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from base.errors import ConvergenceError
-from base.strains import RodStrains
-from reduced.model import SegmentLaw
+from pneunet.base.errors import ConvergenceError
+from pneunet.base.strains import RodStrains
+from pneunet.reduced.model import SegmentLaw
 
 
 class ToyLaw(SegmentLaw):

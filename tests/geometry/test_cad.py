@@ -12,10 +12,11 @@ from dataclasses import replace
 import gmsh
 import pytest
 
-from base.errors import InputError
-from base.materials import NeoHookean
-from geometry import Manipulator, Segment, cad
-from tests.cases import CASES
+from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.cad import body as cad
+from pneunet.geometry.reference_cases import CASES
 
 ONE_SIDED, TWISTING = (
     Segment("one-sided", 60.0, 3),

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from base import se3
-from base.errors import InputError
-from base.materials import Gent, NeoHookean
-from geometry import Manipulator, Segment
-from geometry.designfile import Design, read_design, write_design
-from geometry.loading import Control, DeadLoads, Extras
+from pneunet.base import se3
+from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import Gent, NeoHookean
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.designfile import Design, read_design, write_design
+from pneunet.geometry.loading import Control, DeadLoads, Extras
 
 MATERIAL = NeoHookean(mu=0.25, name='soft "A"', source="a \\ b")
 DESIGN = Design(

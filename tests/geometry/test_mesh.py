@@ -7,8 +7,10 @@ import gmsh
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from geometry import Manipulator, Segment, cad, mesh
+from pneunet.base.errors import InputError
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.cad import body as cad
+from pneunet.geometry.cad import mesh
 
 ONE_SIDED, TWISTING = Segment("one-sided", 70.0, 2), Segment("twisting", 60.0, 2, gap=2.0, cavity_floor=0.5)
 BOTH = Manipulator((TWISTING, replace(ONE_SIDED, width=10.0)))

@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base.materials import NeoHookean
-from geometry.morph import moved
-from geometry.parameters import ONE_SIDED
-from geometry.shape_numbers import DIRECTIONS, changed, direction_matrix, normal_pitch, shape_numbers
-from tests.cases import CASES
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry.cad.morph import moved
+from pneunet.geometry.parameters import ONE_SIDED
+from pneunet.geometry.reference_cases import CASES
+from pneunet.geometry.shape_numbers import DIRECTIONS, changed, direction_matrix, normal_pitch, shape_numbers
 
 BODIES = [
     CASES["one_sided_w10"](angle=60.0, chambers=1, material=NeoHookean(0.2)),

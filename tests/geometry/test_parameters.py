@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.materials import NeoHookean
-from geometry import Manipulator, Segment
-from tests.cases import CASES
+from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.reference_cases import CASES
 
 ONE_SIDED, TWISTING = Segment("one-sided", 60.0, 3), Segment("twisting", 60.0, 3)
 PAPER = NeoHookean(mu=50.0, name="paper")

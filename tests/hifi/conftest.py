@@ -2,14 +2,14 @@
 
 import pytest
 
-from geometry.designfile import read_design
-from hifi.manipulator import ManipulatorSolve
-from tests import reference_case
+from pneunet.geometry.designfile import read_design
+from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.verification import reference_case
 
 
 @pytest.fixture
 def reference():
-    """A ManipulatorSolve of tests/data/reference.msh."""
+    """A ManipulatorSolve of hifi/verification/data/reference.msh."""
     design = read_design(reference_case.DATA / "reference.toml")
     solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
     yield solve

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base.errors import InputError
-from geometry.parameters import ONE_SIDED, TWISTING
-from geometry.shape_numbers import SHAPE, shape_numbers
-from hifi.campaign_case import first_touch, prescribed_change
-from hifi.campaign_extension import taken_over
-from hifi.campaign_sample import RANGES, prescribed_states, segments
-from hifi.campaignfile import EDGES, on_offer, read_campaign
-from reduced.choice import DATA_SET
+from pneunet.base.errors import InputError
+from pneunet.geometry.parameters import ONE_SIDED, TWISTING
+from pneunet.geometry.shape_numbers import SHAPE, shape_numbers
+from pneunet.hifi.runs.campaign.case import first_touch, prescribed_change
+from pneunet.hifi.runs.campaign.extension import taken_over
+from pneunet.hifi.runs.campaign.file import EDGES, on_offer, read_campaign
+from pneunet.hifi.runs.campaign.sample import RANGES, prescribed_states, segments
+from pneunet.reduced.choice import DATA_SET
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="nothing parallel in it")
 

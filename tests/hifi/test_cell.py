@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base.files import read_columns
-from base.materials import NeoHookean
-from geometry import cad
-from geometry.cell import mesh_cell
-from hifi.cell import CellProblem
-from hifi.cell_run import run_cell, solve_cell
-from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
-from hifi.cellfile import CellCase
-from hifi.control import LoadControl
-from hifi.newton import NewtonOptions
-from hifi.path import EquilibriumPath
-from hifi.stepping import StepSize, run_steps
-from tests.cases import CASES
-from tests.recut import recut
+from pneunet.base.files.atomic import read_columns
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry.cad import body as cad
+from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.reference_cases import CASES
+from pneunet.hifi.cell.file import CellCase
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.run import run_cell, solve_cell
+from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.path.control import LoadControl
+from pneunet.hifi.path.equilibrium import EquilibriumPath
+from pneunet.hifi.path.newton import NewtonOptions
+from pneunet.hifi.path.stepping import StepSize, run_steps
+from pneunet.hifi.verification.recut import recut
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base.se3 import exp_rotation
-from geometry.cell import mesh_cell
-from hifi.cell import CellProblem
-from hifi.cell_run import solve_cell
-from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
-from hifi.cellfile import CellCase
-from hifi.contact import ThirdMedium
-from hifi.control import LoadControl
-from hifi.newton import NewtonOptions
-from hifi.path import EquilibriumPath
-from hifi.stepping import StepSize, run_steps
-from hifi.wall_contact import WallPenalty
-from hifi.walls import CellWalls
-from tests.cases import CASES
+from pneunet.base.se3 import exp_rotation
+from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.reference_cases import CASES
+from pneunet.hifi.cell.file import CellCase
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.run import solve_cell
+from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.contact.medium import ThirdMedium
+from pneunet.hifi.contact.penalty import WallPenalty
+from pneunet.hifi.contact.walls import CellWalls
+from pneunet.hifi.path.control import LoadControl
+from pneunet.hifi.path.equilibrium import EquilibriumPath
+from pneunet.hifi.path.newton import NewtonOptions
+from pneunet.hifi.path.stepping import StepSize, run_steps
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 

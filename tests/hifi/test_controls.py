@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from base.errors import ConvergenceError
-from base.materials import NeoHookean
-from hifi.body import BodySystem
-from hifi.control import ArcLength, LoadControl, VolumeControl
-from hifi.loads import EndLoad, Pressure
-from hifi.path import EquilibriumPath, PathState, limit_point
-from hifi.problem import MixedProblem, Support
-from hifi.rod_coordinates import RodCoordinates
-from hifi.stepping import StepSize, run_steps
-from hifi.surface import FaceQuadrature
-from tests.verification import bodies
-from tests.verification.closed_forms import SPHERE_LIMIT, sphere_pressure
-from tests.verification.exact_cases import SYMMETRY
-from tests.verification.following import body_system
+from pneunet.base.errors import ConvergenceError
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.hifi.body.problem import MixedProblem, Support
+from pneunet.hifi.body.system import BodySystem
+from pneunet.hifi.fem.loads import EndLoad, Pressure
+from pneunet.hifi.fem.surface import FaceQuadrature
+from pneunet.hifi.path.control import ArcLength, LoadControl, VolumeControl
+from pneunet.hifi.path.equilibrium import EquilibriumPath, PathState, limit_point
+from pneunet.hifi.path.rod_coordinates import RodCoordinates
+from pneunet.hifi.path.stepping import StepSize, run_steps
+from pneunet.hifi.verification import bodies
+from pneunet.hifi.verification.closed_forms import SPHERE_LIMIT, sphere_pressure
+from pneunet.hifi.verification.exact_cases import SYMMETRY
+from pneunet.hifi.verification.following import body_system
 
 HALF_SPAN, RISE = 20.0, 3.0
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base import se3
-from base.errors import ConvergenceError
-from geometry import Manipulator, Segment
-from geometry.mesh import mesh_manipulator
-from hifi.manipulator import ManipulatorSolve
-from tests import reference_case
+from pneunet.base import se3
+from pneunet.base.errors import ConvergenceError
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.cad.mesh import mesh_manipulator
+from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.verification import reference_case
 
 
 def meshed(manipulator, directory, size=3.0):

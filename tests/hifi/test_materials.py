@@ -10,10 +10,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.optimize import fsolve
 
-from base.hyperelastic import MODES, nominal_stress, shear_stress, slopes
-from base.materials import Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh
-from hifi import compat
-from hifi.materials import energy_density
+from pneunet.base.materials.hyperelastic import MODES, nominal_stress, shear_stress, slopes
+from pneunet.base.materials.laws import Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from pneunet.hifi.fem import compat
+from pneunet.hifi.fem.materials import energy_density
 
 LAWS = [
     NeoHookean(0.3),

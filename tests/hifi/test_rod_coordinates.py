@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base import se3
-from hifi.rod_coordinates import RodCoordinates
-from hifi.stepping import lagrange_coefficients
+from pneunet.base import se3
+from pneunet.hifi.path.rod_coordinates import RodCoordinates
+from pneunet.hifi.path.stepping import lagrange_coefficients
 
 
 def largest(values):

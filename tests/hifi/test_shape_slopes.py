@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base.materials import NeoHookean
-from geometry.cell import mesh_cell
-from geometry.morph import moved
-from geometry.shape_numbers import DIRECTIONS, changed
-from hifi.cell import CellProblem
-from hifi.cell_system import RELATIVE_TOLERANCE, CellSystem
-from hifi.control import LoadControl
-from hifi.newton import NewtonOptions
-from hifi.path import EquilibriumPath
-from hifi.shape_slopes import ShapeSlopes
-from hifi.stepping import StepSize, run_steps
-from hifi.wall_contact import WallPenalty
-from tests.cases import CASES
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.cad.morph import moved
+from pneunet.geometry.reference_cases import CASES
+from pneunet.geometry.shape_numbers import DIRECTIONS, changed
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.shape_slopes import ShapeSlopes
+from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.contact.penalty import WallPenalty
+from pneunet.hifi.path.control import LoadControl
+from pneunet.hifi.path.equilibrium import EquilibriumPath
+from pneunet.hifi.path.newton import NewtonOptions
+from pneunet.hifi.path.stepping import StepSize, run_steps
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hifi.solver import DirectSolver
+from pneunet.hifi.fem.solver import DirectSolver
 
 
 def test_a_growing_pattern_keeps_settings_inertia_and_solution():

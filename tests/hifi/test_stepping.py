@@ -2,9 +2,9 @@
 
 import pytest
 
-from base.errors import ConvergenceError
-from hifi.solver import NotConverged, PredictorTooFar
-from hifi.stepping import StepSize, run_steps
+from pneunet.base.errors import ConvergenceError
+from pneunet.hifi.fem.solver import NotConverged, PredictorTooFar
+from pneunet.hifi.path.stepping import StepSize, run_steps
 
 
 class Wall:

@@ -2,12 +2,12 @@
 
 import pytest
 
-from base.materials import silicone
-from base.tables import toml_text
-from geometry.designfile import design_from_tables
-from hifi.cellfile import CellCase, cell_from_tables, cell_tables
-from hifi.studyfile import read_study, value_of
-from tests.cases import CASES
+from pneunet.base.files.toml import toml_text
+from pneunet.base.materials.laws import silicone
+from pneunet.geometry.designfile import design_from_tables
+from pneunet.geometry.reference_cases import CASES
+from pneunet.hifi.cell.file import CellCase, cell_from_tables, cell_tables
+from pneunet.hifi.runs.study.file import read_study, value_of
 
 SEGMENT = {"kind": "one-sided", "angle_deg": 60.0}
 CELL = {"pressure_kPa": 10.0, "material": {"mu_MPa": 0.3, "density_kg_per_m3": 1000.0}, "segment": SEGMENT}

@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base import se3
-from geometry import Manipulator, Segment, cad
-from geometry.loading import DeadLoads
-from geometry.mesh import mesh_manipulator
-from hifi import tip
-from hifi.manipulator import ManipulatorSolve
-from hifi.newton import NewtonOptions
-from hifi.problem import Support
-from hifi.surface import FaceQuadrature
-from tests.verification import bodies
-from tests.verification.following import body_system
+from pneunet.base import se3
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.cad import body as cad
+from pneunet.geometry.cad.mesh import mesh_manipulator
+from pneunet.geometry.loading import DeadLoads
+from pneunet.hifi.body import tip
+from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.body.problem import Support
+from pneunet.hifi.fem.surface import FaceQuadrature
+from pneunet.hifi.path.newton import NewtonOptions
+from pneunet.hifi.verification import bodies
+from pneunet.hifi.verification.following import body_system
 
 LENGTH, WIDTH, HEIGHT = STRIP = 30.0, 3.0, 2.0
 

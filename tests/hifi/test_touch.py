@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from base import se3
-from base.materials import NeoHookean
-from geometry import Manipulator, Segment
-from geometry.designfile import Design
-from hifi.body_distance import winding_numbers
-from hifi.manipulator_run import solve_design
-from hifi.touch import Load, Touch, TouchWatch, first_zero
+from pneunet.base import se3
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry.designfile import Design
+from pneunet.hifi.contact.body_distance import winding_numbers
+from pneunet.hifi.contact.touch import Load, Touch, TouchWatch, first_zero
+from pneunet.hifi.runs.solve.solve import solve_design
 from tests.hifi.test_manipulator import set_positions
 
 #: mm of undeformed length in one turn of the staircase that the reference body, 44 mm long, is wound to

@@ -6,14 +6,14 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from base.materials import NeoHookean
-from geometry.cell import mesh_cell
-from hifi.cell import CellProblem
-from hifi.cell_system import CellSystem
-from hifi.contact_update import ContactUpdate
-from hifi.wall_contact import PenaltyLaw, WallPenalty, touching
-from tests.cases import CASES
-from tests.verification.pressed import pressed
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.reference_cases import CASES
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.system import CellSystem
+from pneunet.hifi.contact.penalty import PenaltyLaw, WallPenalty, touching
+from pneunet.hifi.path.low_rank import ContactUpdate
+from pneunet.hifi.verification.pressed import pressed
 
 serial = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 UP = np.array([0.0, 0.0, 1.0])

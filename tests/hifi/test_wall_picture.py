@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry import Segment
-from geometry.cell import mesh_cell
-from hifi.cell import CellProblem
-from hifi.cell_system import CellSystem
-from hifi.wall_picture import draw_cell, node_distances
-from hifi.walls import CellWalls
+from pneunet.geometry import Segment
+from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.system import CellSystem
+from pneunet.hifi.contact.picture import draw_cell, node_distances
+from pneunet.hifi.contact.walls import CellWalls
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 

@@ -286,7 +286,7 @@ def test_pressure_beyond_what_converges_keeps_what_did(folder):
 
 
 def test_shapes_beyond_the_reduced_models_limit_keep_the_others(folder, capsys, monkeypatch):
-    from design import shape
+    from pneunet.design import shape
 
     monkeypatch.setattr(shape, "_pictures", lambda *a: None)
     assert main(["shape", "good.toml", "--law", "analytic", "--pressure-kPa", "5,1900", "-o", "out"]) == 2

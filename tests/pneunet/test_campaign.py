@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from base.dataset import columns, read_dataset
-from hifi.campaignfile import read_campaign
+from pneunet.base.files.dataset import columns, read_dataset
 from pneunet.cli import main
+from pneunet.hifi.runs.campaign.file import read_campaign
 
 ROOT = Path(__file__).resolve().parents[2]
 CAMPAIGN = """kinds = ["one-sided"]

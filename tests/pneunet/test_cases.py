@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hifi.jit_cache import own_cache
+from pneunet.hifi.runs.jit_cache import own_cache
 from tests.toy_cases import ENDINGS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.designfile import read_design
-from geometry.mesh import segment_tables
+from pneunet.geometry.cad.mesh import segment_tables
+from pneunet.geometry.designfile import read_design
 
 PNEUNET = Path(sys.executable).with_name("pneunet")
 #: 25 mm of an arc of curvature 20 1/m that bends away from the chambers' side

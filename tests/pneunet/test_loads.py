@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from base.files import read_columns
+from pneunet.base.files.atomic import read_columns
 from pneunet.cli import main
 
 BODY = """mesh_size_mm = 5

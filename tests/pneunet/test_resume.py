@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from base.files import read_columns
-from tests.reference_case import DATA
+from pneunet.base.files.atomic import read_columns
+from pneunet.hifi.verification.reference_case import DATA
 
 SOLVE = ["solve", str(DATA / "reference.toml"), "--pressure-kPa", "35"]
 #: pneunet with so many bytes a file may have, writing more fails as on a full disk; MPI's own files come

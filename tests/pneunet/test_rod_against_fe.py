@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry import Manipulator
-from geometry.loading import DeadLoads
-from geometry.mesh import mesh_manipulator
-from hifi.cell_run import solve_cell
-from hifi.cellfile import CellCase
-from hifi.manipulator import ManipulatorSolve
-from reduced import QuadraticLaw, Rod
-from tests.cases import CASES
+from pneunet.geometry import Manipulator
+from pneunet.geometry.cad.mesh import mesh_manipulator
+from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.reference_cases import CASES
+from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.cell.file import CellCase
+from pneunet.hifi.cell.run import solve_cell
+from pneunet.reduced import QuadraticLaw, Rod
 
 MESH_SIZE, PRESSURE = 2.0, 0.01
 

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from base.dataset import write_dataset
+from pneunet.base.files.dataset import write_dataset
 from tests.reduced.test_law import made_up_data
 
 ROOT = Path(__file__).resolve().parents[2]

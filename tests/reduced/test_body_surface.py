@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry import Manipulator, Segment
-from reduced import AnalyticModel, body_surface
+from pneunet.geometry import Manipulator, Segment
+from pneunet.reduced import AnalyticModel, body_surface
 
 ARM = Manipulator((Segment("twisting", 60.0, 3, cavity_floor=0.5), Segment("one-sided", 70.0, 4)))
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base.materials import NeoHookean
-from geometry import Segment
-from reduced.calibration import calibrate_softness, calibrate_tube, tube_curves
-from reduced.helical import HelicalCell
-from reduced.twisting import TwistingTube
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry import Segment
+from pneunet.reduced.analytic.calibration import calibrate_softness, calibrate_tube, tube_curves
+from pneunet.reduced.analytic.helical import HelicalCell
+from pneunet.reduced.analytic.twisting import TwistingTube
 
 TUBE = TwistingTube(3.0, 7.0, 0.317, 0.8)
 PRESSURES = (0.01, 0.03)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from base import se3
-from base.errors import InputError
-from base.strains import RodStrains
-from reduced.centreline import centreline, free_shapes
+from pneunet.base import se3
+from pneunet.base.errors import InputError
+from pneunet.base.strains import RodStrains
+from pneunet.reduced.rod.centreline import centreline, free_shapes
 
 
 def test_bending_is_a_circle_towards_minus_z():

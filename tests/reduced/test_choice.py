@@ -2,10 +2,10 @@
 
 import pytest
 
-from base.errors import InputError
-from geometry import Segment
-from geometry.parameters import KINDS, ONE_SIDED
-from reduced.choice import SHIPPED, choose_law, shipped_law
+from pneunet.base.errors import InputError
+from pneunet.geometry import Segment
+from pneunet.geometry.parameters import KINDS, ONE_SIDED
+from pneunet.reduced.choice import SHIPPED, choose_law, shipped_law
 
 
 def test_a_law_s_name_chooses_it_again():

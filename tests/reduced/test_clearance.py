@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from reduced.clearance import gap_left, wall_bulge
-from tests.cases import CASES
+from pneunet.geometry.reference_cases import CASES
+from pneunet.reduced.analytic.clearance import gap_left, wall_bulge
 
 
 def plate(short, long, thickness, modulus):

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reduced import gaussian
-from reduced.along_inputs import AlongInputs
-from reduced.gaussian import JITTER, NEAR, TREND, Slopes, _misfit, _spread_over, fit
+from pneunet.reduced.trained import gaussian
+from pneunet.reduced.trained.along_inputs import AlongInputs
+from pneunet.reduced.trained.gaussian import JITTER, NEAR, TREND, Slopes, _misfit, _spread_over, fit
 
 
 def observed(n, seed=0):

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base.errors import ConvergenceError, InputError
-from base.materials import NeoHookean
-from geometry import Segment
-from reduced import laws
-from reduced.cell import INDEX, SIZE
-from reduced.equilibrium import follow
-from reduced.helical import HelicalCell
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.geometry import Segment
+from pneunet.reduced.analytic import energies as laws
+from pneunet.reduced.analytic.equilibrium import follow
+from pneunet.reduced.analytic.helical import HelicalCell
+from pneunet.reduced.analytic.kinematics import INDEX, SIZE
 
 SEGMENT = Segment("one-sided", 60.0, 5, width=10.0, channel_width=2.0, material=NeoHookean(mu=0.2068))
 

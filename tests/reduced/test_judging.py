@@ -5,10 +5,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from geometry.parameters import ONE_SIDED
-from reduced.judging import stiffness_error, strain_error, tip_error
-from reduced.law_coordinates import REST
-from reduced.states import COMMON, ENOUGH, PARTS, Sample, States, splits
+from pneunet.geometry.parameters import ONE_SIDED
+from pneunet.reduced.trained.coordinates import REST
+from pneunet.reduced.training.judging import stiffness_error, strain_error, tip_error
+from pneunet.reduced.training.states import COMMON, ENOUGH, PARTS, Sample, States, splits
 
 
 def sample(designs):

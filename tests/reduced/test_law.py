@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base.dataset import UPPER, CellData, columns, write_dataset
-from base.errors import InputError
-from base.materials import NeoHookean, Yeoh
-from geometry.parameters import KINDS, ONE_SIDED, TWISTING
-from geometry.shape_numbers import SHAPE, direction_matrix, segment_of, shape_numbers
-from reduced.fit_law import fit_closing, fit_path, fit_stiffness
-from reduced.judging import further_angles, stiffness_error, strain_error
-from reduced.law import RodLaw, read_law
-from reduced.law_coordinates import BLOCKS, MIRROR, REST, Coordinates
-from reduced.potential import monomials, whitening
-from reduced.states import sample_of
-from reduced.suggestion import most_telling
-from reduced.training import (
+from pneunet.base.errors import InputError
+from pneunet.base.files.dataset import UPPER, CellData, columns, write_dataset
+from pneunet.base.materials.laws import NeoHookean, Yeoh
+from pneunet.geometry.parameters import KINDS, ONE_SIDED, TWISTING
+from pneunet.geometry.shape_numbers import SHAPE, direction_matrix, segment_of, shape_numbers
+from pneunet.reduced.trained.coordinates import BLOCKS, MIRROR, REST, Coordinates
+from pneunet.reduced.trained.enthalpy import monomials, whitening
+from pneunet.reduced.trained.law import RodLaw, read_law
+from pneunet.reduced.training.fit import fit_closing, fit_path, fit_stiffness
+from pneunet.reduced.training.judging import further_angles, stiffness_error, strain_error
+from pneunet.reduced.training.states import sample_of
+from pneunet.reduced.training.suggestion import most_telling
+from pneunet.reduced.training.train import (
     FURTHER_BY,
     designs_at_further_angles,
     judge_free_states_again,

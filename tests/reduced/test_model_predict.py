@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from base.materials import NeoHookean
-from base.strains import RodStrains
-from geometry import Manipulator, Segment
-from reduced import AnalyticModel, QuadraticLaw, Rod, predict
-from reduced.ends import free_manipulator
-from reduced.model import SegmentLaw, doubts
+from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import NeoHookean
+from pneunet.base.strains import RodStrains
+from pneunet.geometry import Manipulator, Segment
+from pneunet.reduced import AnalyticModel, QuadraticLaw, Rod, predict
+from pneunet.reduced.model import SegmentLaw, doubts
+from pneunet.reduced.rod.ends import free_manipulator
 
 TWISTING = Segment("twisting", 60.0, 4, cavity_floor=0.5)
 BENDING = Segment("one-sided", 90.0, 3)

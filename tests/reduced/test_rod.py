@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 
-from base import se3
-from base.errors import ConvergenceError, InputError
-from geometry import Manipulator
-from geometry.loading import DeadLoads
-from reduced.rod import Piece, Rod
-from reduced.rod_equilibrium import Grid
-from reduced.section_laws import QuadraticLaw, passive_law
-from tests.cases import CASES
+from pneunet.base import se3
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.geometry import Manipulator
+from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.reference_cases import CASES
+from pneunet.reduced.rod.equilibrium import Grid
+from pneunet.reduced.rod.laws import QuadraticLaw, passive_law
+from pneunet.reduced.rod.rod import Piece, Rod
 
 REST = np.eye(6)[0]
 #: EA, GA, GA in N, GJ, EI, EI in N mm2

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from base.errors import InputError
-from geometry.parameters import TWISTING
-from geometry.shape_numbers import shape_numbers
-from hifi.campaign_sample import RANGES, segments
-from reduced import gaussian, shipped_law
-from reduced.suggestion import greedy, most_telling
+from pneunet.base.errors import InputError
+from pneunet.geometry.parameters import TWISTING
+from pneunet.geometry.shape_numbers import shape_numbers
+from pneunet.hifi.runs.campaign.sample import RANGES, segments
+from pneunet.reduced import shipped_law
+from pneunet.reduced.trained import gaussian
+from pneunet.reduced.training.suggestion import greedy, most_telling
 
 
 def test_the_first_of_them_is_the_one_that_lowers_the_weighed_variance_most():

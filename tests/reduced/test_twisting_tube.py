@@ -4,11 +4,11 @@ form."""
 import numpy as np
 import pytest
 
-from base.errors import ConvergenceError, InputError
-from geometry import Segment
-from reduced.printed import largest_twist, printed_equations
-from reduced.section import empty_area, equivalent_radii, occupied_area
-from reduced.twisting import TubePotential, TwistingTube
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.geometry import Segment
+from pneunet.reduced.analytic.printed import largest_twist, printed_equations
+from pneunet.reduced.analytic.twisting import TubePotential, TwistingTube
+from pneunet.reduced.rod.areas import empty_area, equivalent_radii, occupied_area
 
 REFERENCE = TwistingTube(3.0, 7.0, 0.317, 0.8)  # physics of the consistent form, angle 60 deg
 

@@ -3,7 +3,7 @@ energy."""
 
 import pytest
 
-from tests.verification import cook, energy_balance, land, manufactured, patch
+from pneunet.hifi.verification import cook, energy_balance, land, manufactured, patch
 
 
 def test_land_problem_1():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tests.verification import cells, closed_forms, exact_cases
+from pneunet.hifi.verification import cells, closed_forms, exact_cases
 
 BAR = 1e-3
 #: independent values that the closed forms must give

@@ -1,0 +1,1 @@
+"""Files: TOML, CSV, archives and records; whole or not there."""

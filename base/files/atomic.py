@@ -1,0 +1,99 @@
+"""Files that are whole or not there: everything is written to a temporary name and renamed."""
+
+import csv
+import io
+import os
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from pneunet.base.errors import InputError
+
+
+@contextmanager
+def atomic_path(path):
+    """A temporary path beside `path` to write to; renamed onto it when the block ends without an
+    exception."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+    os.close(handle)
+    try:
+        yield Path(temporary)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+
+
+def write_text(path, text):
+    with atomic_path(path) as temporary:
+        temporary.write_text(text)
+
+
+def write_csv(path, header, rows):
+    """A CSV of numbers (and words), full precision to 12 digits."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow([f"{v:.12g}" if isinstance(v, (float, np.floating)) else v for v in row])
+    write_text(path, out.getvalue())
+
+
+def read_csv(path):
+    """(header, rows of text) of a CSV file; a missing file is an InputError."""
+    try:
+        with open(path, newline="") as stream:
+            rows = [row for row in csv.reader(stream) if row and any(cell.strip() for cell in row)]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as text ({error})") from None
+    if not rows:
+        raise InputError(f"{path}: is empty")
+    return rows[0], rows[1:]
+
+
+def read_columns(path, columns):
+    """Float array (n, len(columns)) of named columns of a CSV the project wrote itself."""
+    header, rows = read_csv(path)
+    missing = [c for c in columns if c not in header]
+    if missing:
+        raise InputError(f"{path}: column '{missing[0]}' is missing")
+    out = np.empty((len(rows), len(columns)))
+    for i, row in enumerate(rows):
+        for j, column in enumerate(columns):
+            try:
+                out[i, j] = float(row[header.index(column)])
+            except (ValueError, IndexError):
+                raise InputError(
+                    f"{path} row {i + 2}: '{column}' is not a number: make the file again"
+                ) from None
+    return out
+
+
+def output_directory(path):
+    """The folder, made if need be; an unwritable one is an InputError before any work is done."""
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be written to ({error.strerror}): choose another folder with -o"
+        ) from None
+    return path
+
+
+def require_writable(path):
+    """InputError when `path` could not be made or written to; makes nothing itself, for use before long
+    work."""
+    existing = Path(path).absolute()
+    while not existing.exists():
+        existing = existing.parent
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        raise InputError(f"{path}: cannot be written to: choose another folder with -o")

@@ -1,0 +1,1 @@
+"""Silicones: laws as energies, makers' figures, tensile tests and fits."""

@@ -1,0 +1,149 @@
+"""`pneunet fit-material`: from a tensile test to a [material] table, a picture and a word on how far to trust
+it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import atomic_path, output_directory, write_text
+from pneunet.base.files.toml import toml_text
+from pneunet.base.materials.fitting import TensileData, biaxial_spread, fit
+from pneunet.base.materials.hyperelastic import nominal_stress
+from pneunet.base.materials.laws import LAWS, material_to_table
+from pneunet.base.materials.tensile import read_tensile
+
+#: laws that fit worse than this (relative) have no say in how uncertain the equibiaxial response is
+CREDIBLE = 0.1
+
+
+def run_fit(path, law="all", directory=None, stress_unit=None, largest_strain=np.inf, say=print):
+    """Fit `law` (a name of base.materials.laws.LAWS, any case, or "all") to the tests in `path`; returns the
+    chosen Fit.
+
+    Writes material.toml and fit.png to `directory` (default out/fit-STEM). largest_strain: fit no further
+    than this engineering strain. With "all" the least error without instability is chosen.
+    """
+    path = Path(path)
+    names = {name.lower(): name for name in LAWS}
+    if law.lower() not in (*names, "all"):
+        raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
+    specimens = read_tensile(path, stress_unit)
+    try:
+        tests = TensileData(specimens, largest_strain)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    directory = output_directory(directory or Path("out") / f"fit-{path.stem}")
+    elongation = min(float(s.stretch[-1]) for s in specimens) - 1
+    common = {
+        "elongation_at_break": elongation,
+        "name": path.stem,
+        "source": f"pneunet fit-material {path.name}: uniaxial to stretch {tests.largest:.3g}",
+    }
+    fits = {}
+    for name in LAWS:
+        try:
+            fits[name] = fit(name, tests, **common)
+        except InputError as error:
+            if law.lower() == name.lower():
+                raise InputError(f"{path}: no usable law comes out ({error})") from None
+    chosen = fits[names[law.lower()]] if law.lower() != "all" else best(fits.values())
+    write_text(directory / "material.toml", toml_text({"material": material_to_table(chosen.material)}))
+    credible = [f for f in fits.values() if f is chosen or f.error < CREDIBLE]
+    stretch = min(2.0, tests.largest)
+    low, high = biaxial_spread(credible, stretch)
+    shown = list(fits.values()) if law.lower() == "all" else [chosen]
+    draw(directory / "fit.png", path.stem, specimens, tests, shown, chosen, credible)
+    count = f"{len(specimens)} specimen{'s' * (len(specimens) > 1)}"
+    say(
+        f"{path.name}: {count}, fitted to stretch {tests.largest:.2f}, break at {100 * elongation:.0f} %"
+        " strain"
+    )
+    for f in shown:
+        say(
+            f"{'-> ' if f is chosen else '   '}{f.material.law:14s} error {100 * f.error:5.1f} %  "
+            f" {parameters(f.material)}"
+        )
+    for warning in chosen.warnings:
+        say(f"warning: {warning}")
+    if not any(s.broke for s in specimens):
+        say(
+            "warning: no fall of the stress is seen: if the test stopped before break, take"
+            " elongation_at_break_percent out"
+        )
+    say(
+        f"warning: uniaxial data alone: at equibiaxial stretch {stretch:.2g} the {len(credible)} laws that"
+        f" fit predict {low:.4g}..{high:.4g} MPa"
+    )
+    say(f"written: {directory / 'material.toml'}, fit.png")
+    return chosen
+
+
+def best(fits):
+    """Least error among fits that are stable and likely in equibiaxial tension; among all if there is
+    none."""
+    stable = [f for f in fits if not any(w.startswith(("unstable", "unlikely")) for w in f.warnings)]
+    return min(stable or fits, key=lambda f: f.error)
+
+
+def parameters(material):
+    """The law's own parameters in file units, in one line."""
+    table = material_to_table(material)
+    own = list(table.items())[1 : 1 + len(material.parameters)]
+    return ", ".join(f"{key} = {value:.4g}" for key, value in own if value)
+
+
+def draw(path, title, specimens, tests, shown, chosen, credible):
+    """Data and fits, residuals, and what the laws say of equibiaxial tension; nominal stress against
+    stretch."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 5.2), layout="constrained")
+    grid = figure.add_gridspec(2, 2, height_ratios=(3, 1))
+    fitted, residual, biaxial = (
+        figure.add_subplot(grid[0, 0]),
+        figure.add_subplot(grid[1, 0]),
+        figure.add_subplot(grid[:, 1]),
+    )
+    for s in specimens:
+        near = s.stretch <= 1 + 1.15 * (tests.largest - 1)
+        fitted.plot(s.stretch[near], s.stress[near], ".", color="0.6", markersize=3)
+    fitted.plot([], [], ".", color="0.6", label="test")
+
+    def style(f):
+        i = list(LAWS).index(f.material.law)
+        # dashed in turn: a law may hide another that it contains
+        return {
+            "color": f"C{i}",
+            "linewidth": 2.2 if f is chosen else 1.3,
+            "linestyle": "-" if i % 2 == 0 else (i, (4, 3)),
+        }
+
+    l = np.linspace(1.0, tests.largest, 300)
+    for f in shown:
+        label = f"{f.material.law}, {100 * f.error:.1f} %"
+        fitted.plot(l, nominal_stress(f.material, "uniaxial", l), label=label, **style(f))
+    for f in (f for f in shown if f in credible):
+        for s in specimens:
+            use = s.stretch <= tests.largest
+            off = nominal_stress(f.material, "uniaxial", s.stretch[use]) - s.stress[use]
+            residual.plot(s.stretch[use], 1e3 * off, **style(f))
+    residual.axhline(0, color="0.3", linewidth=0.6)
+    l = np.linspace(1.0, min(tests.largest, 3.0), 200)
+    for f in credible:
+        biaxial.plot(l, nominal_stress(f.material, "equibiaxial", l), label=f.material.law, **style(f))
+    biaxial.set_ylim(0, 2 * np.nanmax(nominal_stress(chosen.material, "equibiaxial", l[: int(0.9 * len(l))])))
+    fitted.set(title=f"{title}: uniaxial test and fit", ylabel="nominal stress, MPa", ylim=(0, None))
+    residual.set(xlabel="stretch", ylabel="law - test, kPa", xlim=fitted.get_xlim())
+    biaxial.set(
+        title="equibiaxial tension, not tested: what the laws say",
+        xlabel="stretch",
+        ylabel="nominal stress, MPa",
+    )
+    fitted.legend(title="law, relative RMS error")
+    biaxial.legend()
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=130)

@@ -1,0 +1,196 @@
+"""Fit a law to uniaxial tests, and say how far the fit is to be trusted.
+
+Nominal stress is linear in a law's moduli once jm (Gent) or the exponents (Ogden) are fixed, so the moduli
+are found by linear least squares with lower bounds of zero (which keep every law but Yeoh's stable), and the
+rest by a search around them.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+from types import SimpleNamespace
+
+import numpy as np
+from scipy.optimize import minimize, nnls
+
+from pneunet.base.errors import InputError
+from pneunet.base.materials.hyperelastic import MODES, nominal_stress, stable_stretch
+from pneunet.base.materials.laws import LAWS, Ogden
+
+#: Ogden's exponents: bounds, and where to start. Below -2 (Mooney-Rivlin's second term) the uniaxial curve
+#: hardly sees the exponent, while the equibiaxial stress grows as l^(-2 alpha): fits there predicted it wrong
+#: by a factor of a hundred.
+LOWEST_EXPONENT, HIGHEST_EXPONENT = -2.0, Ogden.largest_exponent
+EXPONENTS = (-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+#: equibiaxial over uniaxial nominal stress at the same stretch, up to 2: neo-Hookean 1.1, measured on rubbers
+#: up to about 2
+LARGEST_RATIO = 2.5
+#: largest jm: beyond it Gent's law is the neo-Hookean one
+LARGEST_JM = 1e5
+
+
+@dataclass(frozen=True)
+class Fit:
+    """material: the law with its parameters; error: root mean square of the stress error over that of the
+    stress; warnings: why not to trust it, each one line."""
+
+    material: object
+    error: float
+    warnings: tuple
+
+
+class TensileData:
+    """What is fitted: all points of all specimens, thinned to at most 200 a specimen and weighted equally."""
+
+    def __init__(self, specimens, largest_strain=np.inf):
+        stretch, stress, weight = [], [], []
+        for s in specimens:
+            use = np.flatnonzero(s.stretch - 1 <= largest_strain)
+            use = (
+                use[np.unique(np.linspace(0, len(use) - 1, min(200, len(use))).astype(int))]
+                if len(use)
+                else use
+            )
+            stretch.append(s.stretch[use])
+            stress.append(s.stress[use])
+            weight.append(np.full(len(use), 1 / np.sqrt(max(len(use), 1))))
+        self.stretch, self.stress, self.weight = (np.concatenate(part) for part in (stretch, stress, weight))
+        if len(self.stretch) < 5:
+            raise InputError("fewer than 5 points are left to fit: fit to a larger strain")
+        self.largest = float(self.stretch.max())
+        self.size = float(np.linalg.norm(self.weight * self.stress))
+
+    def error(self, material):
+        """Relative root mean square error of the nominal stress."""
+        return float(
+            np.linalg.norm(self.weight * (nominal_stress(material, "uniaxial", self.stretch) - self.stress))
+            / self.size
+        )
+
+    def moduli(self, law, names, free=(), **fixed):
+        """({name: MPa}, relative error) of the best moduli >= 0 (any sign for those in `free`), the rest
+        `fixed`."""
+        signs = [(name, 1.0) for name in names] + [(name, -1.0) for name in free]
+        columns = []
+        for name, sign in signs:
+            unit = SimpleNamespace(law=law, **{n: sign * (n == name) for n in names}, **fixed)
+            if law == Ogden.law:
+                unit.terms = ((1.0, fixed["alpha" + name[2:]]),)
+            columns.append(self.weight * nominal_stress(unit, "uniaxial", self.stretch))
+        scale = np.linalg.norm(columns, axis=1)
+        values, residual = nnls((np.array(columns) / scale[:, None]).T, self.weight * self.stress)
+        values[values < 1e-6 * values.max()] = 0.0  # rounding, not a term
+        found = dict.fromkeys(names, 0.0)
+        for (name, sign), value in zip(signs, values / scale):
+            found[name] += sign * float(value)
+        return found, residual / self.size
+
+
+def _gent(tests):
+    lowest = 1.001 * (tests.largest**2 + 2 / tests.largest - 3)
+
+    def parameters(jm):
+        return tests.moduli("Gent", ("mu",), jm=jm)
+
+    grid = lowest * np.geomspace(1, LARGEST_JM / lowest, 60)
+    start = np.log(grid[np.argmin([parameters(jm)[1] for jm in grid])])
+    x = minimize(
+        lambda x: parameters(np.exp(np.clip(x[0], np.log(lowest), np.log(LARGEST_JM))))[1],
+        [start],
+        method="Nelder-Mead",
+    ).x
+    jm = float(np.exp(np.clip(x[0], np.log(lowest), np.log(LARGEST_JM))))
+    return parameters(jm)[0] | {"jm": jm}
+
+
+def _ogden(tests):
+    """The fewest terms that fit within a tenth as well as three do."""
+
+    def solve(exponents):
+        a = np.clip(exponents, LOWEST_EXPONENT, HIGHEST_EXPONENT)
+        a = np.where(np.abs(a) < 0.01, 0.01, a)
+        names = [f"mu{p}" for p in range(1, len(a) + 1)]
+        alphas = {f"alpha{p}": float(x) for p, x in enumerate(a, start=1)}
+        moduli, error = tests.moduli("Ogden", names, **alphas)
+        return moduli | alphas, error
+
+    best = []
+    for terms in (1, 2, 3):
+        starts = sorted(combinations(EXPONENTS, terms), key=lambda a: solve(a)[1])[:3]
+        found = [
+            minimize(lambda a: solve(a)[1], a, method="Nelder-Mead", options={"maxiter": 400}).x
+            for a in starts
+        ]
+        best.append(min((solve(a) for a in found), key=lambda one: one[1]))
+    enough = 1.1 * min(error for _, error in best) + 1e-9
+    return next(parameters for parameters, error in best if error <= enough)
+
+
+SEARCHES = {
+    "neo-Hookean": lambda t: t.moduli("neo-Hookean", ("mu",))[0],
+    "Mooney-Rivlin": lambda t: t.moduli("Mooney-Rivlin", ("c10", "c01"))[0],
+    "Yeoh": lambda t: t.moduli("Yeoh", ("c10", "c20", "c30"), free=("c20",))[0],
+    "Gent": _gent,
+    "Ogden": _ogden,
+}
+
+
+def fit(law, tests, **common):
+    """The Fit of one law to `TensileData`; `common`: density, name and the like. InputError when no usable
+    law comes out."""
+    parameters = {name: float(f"{value:.6g}") for name, value in SEARCHES[law](tests).items()}
+    material = LAWS[law](**parameters, **common)
+    return Fit(material, tests.error(material), tuple(_warnings(material, tests)))
+
+
+def _warnings(material, tests):
+    error, reach = tests.error(material), tests.largest
+    if reach < 1.3:
+        yield f"the test reaches only {100 * (reach - 1):.0f} % strain: everything beyond is a guess"
+    if error > 0.05:
+        yield (
+            f"the stress is off by {100 * error:.0f} % (root mean square): this law does not have the curve's"
+            " shape"
+        )
+    early = tests.stretch <= min(1.5, 1 + 0.5 * (reach - 1))
+    if early.sum() >= 3:
+        measured, told = (
+            tests.stress[early].sum(),
+            nominal_stress(material, "uniaxial", tests.stretch[early]).sum(),
+        )
+        if abs(told / measured - 1) > 0.15:
+            yield (
+                f"up to {100 * (tests.stretch[early].max() - 1):.0f} % strain the law is"
+                f" {abs(100 * (told / measured - 1)):.0f} % too {'stiff' if told > measured else 'soft'},"
+                " where a robot mostly works: fit to less strain"
+            )
+    for name in material.parameters:
+        value = getattr(material, name)
+        if (name.startswith("c") or name == "mu") and value == 0 and (name != "c20"):
+            yield f"{name} came out at its bound 0: the test does not ask for it"
+        if name == "jm" and value > 0.9 * LARGEST_JM:
+            yield "jm came out at its bound: the test shows no stiffening, take the neo-Hookean law"
+        if name.startswith("alpha") and value and not LOWEST_EXPONENT < value < HIGHEST_EXPONENT:
+            yield f"{name} = {value:g} came out at its bound"
+    stretch = min(2.0, reach)
+    ratio = nominal_stress(material, "equibiaxial", stretch) / nominal_stress(material, "uniaxial", stretch)
+    if not ratio < LARGEST_RATIO:
+        yield (
+            f"unlikely in equibiaxial: {ratio:.2g} times the uniaxial stress at stretch {stretch:.2g}, where"
+            " rubbers have 1.1 to 2"
+        )
+    for mode in MODES:
+        limit = stable_stretch(material, mode, 1.5 * reach)
+        if limit < np.inf:
+            where = (
+                "inside the test's range"
+                if limit <= reach
+                else f"just outside the test's range (stretch {reach:.3g})"
+            )
+            yield f"unstable in {mode} from stretch {limit:.3g} on, {where}"
+
+
+def biaxial_spread(fits, stretch):
+    """(lowest, highest) equibiaxial nominal stress (MPa) that the fitted laws predict at this stretch."""
+    values = [float(nominal_stress(f.material, "equibiaxial", stretch)) for f in fits]
+    known = [v for v in values if np.isfinite(v)]
+    return min(known), max(known)

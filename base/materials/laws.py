@@ -1,0 +1,225 @@
+"""Material parameters: what a silicone is, apart from how a solver uses it.
+
+Each law is an energy density W (MPa) of the isochoric deformation, with I1 and I2 the invariants of C /
+det(C)^(1/3) and l1, l2, l3 its principal stretches. Incompressible unless a bulk modulus is given.
+"""
+
+import math
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.toml import as_table, file_key, from_table, quantity, to_table
+from pneunet.base.materials.hyperelastic import MODES, stable_stretch
+from pneunet.base.materials.silicones import bulletin
+
+#: a law that is not stable up to this stretch has a slip in its numbers
+STABLE_AT_LEAST = 1.2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hyperelastic:
+    """What every law has beside its own parameters; those come first, in order of the law's formula.
+
+    density in tonne/mm^3 (file key: kg/m^3); bulk_modulus in MPa, inf = incompressible; elongation_at_break:
+    engineering strain, inf = not known. Infinite values are not written to files.
+    """
+
+    density: float = quantity("kg_per_m3", 1.07e-9, note="mass density")
+    bulk_modulus: float = quantity("MPa", math.inf, note="incompressible unless given")
+    elongation_at_break: float = quantity("percent", math.inf, note="engineering strain at break")
+    name: str = field(default="silicone", metadata={"unit": None, "note": "free text"})
+    source: str = field(default="", metadata={"unit": None, "note": "where the numbers come from"})
+
+    def __post_init__(self):
+        if not 0 <= self.density < 1e-7:
+            raise InputError(f"density_kg_per_m3 = {self.density * 1e12:g} is outside 0..1e5")
+        if not self.elongation_at_break > 0:
+            raise InputError(
+                f"elongation_at_break_percent = {self.elongation_at_break * 100:g} must be larger than 0"
+            )
+        self._check_law()
+        if not 1e-4 <= self.mu <= 1e3:
+            raise InputError(
+                f"{self.stiffness} = {self.mu:g} is outside 1e-4..1e3 MPa: silicones lie in 0.01..2 MPa; is"
+                " it in kPa?"
+                if self.mu > 0
+                else (
+                    f"{self.stiffness} = {self.mu:g} must be larger than 0: the initial shear modulus would"
+                    " not be positive"
+                )
+            )
+        if not self.bulk_modulus >= 5 * self.mu:
+            raise InputError(
+                f"bulk_modulus_MPa = {self.bulk_modulus:g} is less than 5 shear moduli ({self.mu:g} MPa): not"
+                " a rubber; leave it out for an incompressible one"
+            )
+        for mode in MODES:
+            limit = stable_stretch(self, mode, STABLE_AT_LEAST)
+            if limit < math.inf:
+                raise InputError(
+                    f"law = '{self.law}': these parameters are unstable from stretch {limit:.3g} on in"
+                    f" {mode}: check signs"
+                )
+
+    def __init_subclass__(cls):
+        #: names of the law's own parameters, in order
+        cls.parameters = tuple(name for name in cls.__annotations__)
+
+    def _check_law(self):
+        """InputError for parameters that this law cannot have."""
+
+    @property
+    def bulk_compliance(self):
+        """1 / bulk modulus, 1/MPa; 0 when incompressible."""
+        return 1 / self.bulk_modulus
+
+    @property
+    def break_stretch(self):
+        """Stretch at which a strip breaks; inf when not known."""
+        return 1 + self.elongation_at_break
+
+
+@dataclass(frozen=True)
+class NeoHookean(Hyperelastic):
+    """W = mu/2 (I1 - 3)."""
+
+    mu: float = quantity("MPa", note="shear modulus")
+    law = "neo-Hookean"
+    stiffness = "mu_MPa"
+
+
+@dataclass(frozen=True)
+class MooneyRivlin(Hyperelastic):
+    """W = c10 (I1 - 3) + c01 (I2 - 3)."""
+
+    c10: float = quantity("MPa")
+    c01: float = quantity("MPa")
+    law = "Mooney-Rivlin"
+    stiffness = "2 (c10_MPa + c01_MPa)"
+
+    @property
+    def mu(self):
+        return 2 * (self.c10 + self.c01)
+
+
+@dataclass(frozen=True)
+class Yeoh(Hyperelastic):
+    """W = c10 (I1 - 3) + c20 (I1 - 3)^2 + c30 (I1 - 3)^3."""
+
+    c10: float = quantity("MPa")
+    c20: float = quantity("MPa", 0.0)
+    c30: float = quantity("MPa", 0.0)
+    law = "Yeoh"
+    stiffness = "2 c10_MPa"
+
+    @property
+    def mu(self):
+        return 2 * self.c10
+
+
+@dataclass(frozen=True)
+class Gent(Hyperelastic):
+    """W = -mu jm/2 ln(1 - (I1 - 3)/jm): no state with I1 >= 3 + jm exists."""
+
+    mu: float = quantity("MPa", note="shear modulus")
+    jm: float = quantity(None, note="largest I1 - 3")
+    law = "Gent"
+    stiffness = "mu_MPa"
+
+    def _check_law(self):
+        if not 0.1 <= self.jm <= 1e6:
+            raise InputError(
+                f"jm = {self.jm:g} must lie in 0.1..1e6: it is the largest I1 - 3 (some 10 to 100 for"
+                " silicones)"
+            )
+
+
+@dataclass(frozen=True)
+class Ogden(Hyperelastic):
+    """W = sum over p of 2 mu_p / alpha_p^2 (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3), up to three terms.
+
+    The shear modulus is mu1 + mu2 + mu3. (With the other convention, W = sum M_p / alpha_p (...), mu_p = M_p
+    alpha_p / 2.)
+    """
+
+    mu1: float = quantity("MPa")
+    alpha1: float = quantity(None)
+    mu2: float = quantity("MPa", 0.0)
+    alpha2: float = quantity(None, 0.0)
+    mu3: float = quantity("MPa", 0.0)
+    alpha3: float = quantity(None, 0.0)
+    law = "Ogden"
+    stiffness = "mu1_MPa + mu2_MPa + mu3_MPa"
+    largest_exponent = 10.0
+
+    @property
+    def mu(self):
+        return self.mu1 + self.mu2 + self.mu3
+
+    @cached_property
+    def terms(self):
+        """((mu_p, alpha_p), ...) of the terms in use."""
+        return tuple(
+            (m, a)
+            for m, a in ((self.mu1, self.alpha1), (self.mu2, self.alpha2), (self.mu3, self.alpha3))
+            if m
+        )
+
+    @cached_property
+    def half_power_weights(self):
+        """What finite elements take instead: see base.materials.halfpowers."""
+        from pneunet.base.materials.halfpowers import weights
+
+        return weights(self.terms)
+
+    def _check_law(self):
+        for p, (m, a) in enumerate(
+            ((self.mu1, self.alpha1), (self.mu2, self.alpha2), (self.mu3, self.alpha3)), start=1
+        ):
+            if m and not 1e-3 <= abs(a) <= self.largest_exponent:
+                raise InputError(
+                    f"alpha{p} = {a:g} must lie in -{self.largest_exponent:g}..{self.largest_exponent:g} and"
+                    " not be 0"
+                )
+
+
+#: The paper's two calibrations (physics: mu = 0.317 for its twisting theory; E = 0.619, nu = 0.49 for its
+#: helical one).
+PAPER_TWISTING = NeoHookean(mu=0.317, name="paper, twisting theory", source="Jiang et al. 2021, Eq. 2")
+PAPER_HELICAL = NeoHookean(
+    mu=0.619 / (2 * 1.49), name="paper, helical theory", source="Jiang et al. 2021, Sec. IV, E=0.619, nu=0.49"
+)
+
+LAWS = {cls.law: cls for cls in (NeoHookean, MooneyRivlin, Yeoh, Gent, Ogden)}
+
+
+def silicone(name):
+    """NeoHookean of the table in base.materials.silicones; InputError for another name."""
+    return from_table(NeoHookean, bulletin(name), "silicone")
+
+
+def material_from_table(table, where):
+    """A law from its TOML table: `law = "..."` (default neo-Hookean) with its parameters, or `silicone =
+    "..."`, a row of the table in base.materials.silicones, of which further keys replace values."""
+    table = as_table(table, where)
+    if "silicone" in table:
+        if "law" in table:
+            raise InputError(
+                f"{where}: 'silicone' and 'law' exclude each other: the table of silicones is neo-Hookean"
+            )
+        try:
+            table = {**bulletin(table.pop("silicone")), **table}
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+    law = table.pop("law", NeoHookean.law)
+    if law not in tuple(LAWS):
+        raise InputError(f"{where}: unknown law '{law}': known laws are {', '.join(LAWS)}")
+    return from_table(LAWS[law], table, where)
+
+
+def material_to_table(material):
+    """The TOML table that material_from_table reads, the law's own parameters first."""
+    table = to_table(material)
+    own = {file_key(f): table.pop(file_key(f)) for f in fields(material) if f.name in material.parameters}
+    return {"law": material.law, **own, **table}

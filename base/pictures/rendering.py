@@ -1,0 +1,168 @@
+"""Pictures of bodies: VTK off-screen (no X needed), one view for all; matplotlib adds scale, axes and colour
+bar.
+
+pyvista and matplotlib are imported inside the functions: without them everything else works.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneunet.base.files.atomic import atomic_path
+
+PIXELS = (900, 720)
+
+
+def camera_angles(points):
+    """(elevation, azimuth) in degrees from which a curve (n, 3) with z up is seen well: 25 degrees above, and
+    across its longest horizontal direction, turned by 30 degrees so that depth shows."""
+    flat = np.asarray(points)[:, :2] - np.mean(np.asarray(points)[:, :2], axis=0)
+    _, _, directions = np.linalg.svd(flat, full_matrices=False)
+    along = directions[0] * (1 if directions[0] @ (flat[-1] - flat[0]) >= 0 else -1)
+    return 25.0, float(np.degrees(np.arctan2(along[1], along[0]))) - 90.0 + 30.0
+
+
+def figure(width, height):
+    """A matplotlib Figure (inches) with the Agg canvas: no window, no global state."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), facecolor="white")
+
+
+def save(figure, path, dpi=120):
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi)
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection: focus (3,), unit vectors `right` and `up` (3,) of the image, half height shown
+    in mm."""
+
+    focus: np.ndarray
+    right: np.ndarray
+    up: np.ndarray
+    half_height: float
+
+    @property
+    def millimetres_per_pixel(self):
+        return 2 * self.half_height / PIXELS[1]
+
+
+def view_of(points, margin=1.12):
+    """The View that holds all points (n, 3), seen from `camera_angles`."""
+    points = np.asarray(points, float)
+    elevation, azimuth = np.radians(camera_angles(points))
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    up = np.array(
+        [-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)]
+    )
+    towards = np.cross(right, up)
+    image = points @ np.column_stack([right, up, towards])
+    middle = (image.min(axis=0) + image.max(axis=0)) / 2
+    half = np.ptp(image, axis=0) / 2
+    focus = middle @ np.array([right, up, towards])
+    return View(focus, right, up, margin * max(half[1], half[0] * PIXELS[1] / PIXELS[0]))
+
+
+def render(view, things, pixels=PIXELS):
+    """Image (height, width, 3) of [(pyvista mesh, keywords of Plotter.add_mesh)]."""
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    # without X, VTK tries it first and warns before it falls back to EGL or OSMesa
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(pixels))
+    plotter.set_background("white")
+    towards = np.cross(view.right, view.up)
+    for mesh, keywords in things:
+        if mesh.n_lines:  # in front of the faces they lie on
+            mesh = mesh.translate(0.15 * towards)
+        plotter.add_mesh(mesh, **{"show_scalar_bar": False, "ambient": 0.35, "diffuse": 0.75, **keywords})
+    plotter.enable_parallel_projection()
+    distance = 20 * view.half_height
+    plotter.camera.focal_point = view.focus
+    plotter.camera.position = view.focus + distance * towards
+    plotter.camera.up = view.up
+    plotter.camera.parallel_scale = view.half_height
+    plotter.camera.clipping_range = (0.1 * distance, 2 * distance)
+    plotter.enable_anti_aliasing("ssaa")
+    image = plotter.screenshot(return_img=True)
+    plotter.close()
+    return np.asarray(image)[..., :3]
+
+
+def edges(mesh, angle=35):
+    """Sharp edges and rims of a surface as thin dark lines."""
+    found = mesh.extract_feature_edges(feature_angle=angle, boundary_edges=True, non_manifold_edges=False)
+    return found, {"color": "#3b434b", "line_width": 1.5, "lighting": False}
+
+
+def coloured(surface, name, limits, cmap):
+    """A surface coloured by point data."""
+    return surface, {"scalars": name, "clim": limits, "cmap": cmap}
+
+
+def write_picture(path, view, image, title, bar=None, extend="neither"):
+    """PNG of a rendered image with a title, a scale in mm, the directions of the axes and, when `bar` =
+    (label, limits, cmap) is given, a colour bar; extend: as matplotlib's, the ends beyond which there are
+    values."""
+    height = 5.95 + (0.85 if bar else 0.0)
+    fig = figure(7.0, height)
+    picture = 5.6 / height
+    show(fig.add_axes([0, 1 - picture - 0.35 / height, 1, picture]), view, image)
+    fig.text(0.02, 1 - 0.09 / height, title, fontsize=15, weight="bold", va="top")
+    if bar:
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+
+        label, limits, cmap = bar
+        cax = fig.add_axes([0.1, 0.62 / height, 0.8, 0.15 / height])
+        fig.colorbar(
+            ScalarMappable(Normalize(*limits), cmap), cax=cax, orientation="horizontal", extend=extend
+        )
+        cax.set_xlabel(label, fontsize=13)
+        cax.tick_params(labelsize=12)
+    save(fig, path, dpi=100)
+
+
+def show(ax, view, image):
+    """A rendered image in matplotlib axes, with scale and directions."""
+    ax.imshow(image)
+    ax.set_axis_off()
+    _scale_bar(ax, view)
+    _triad(ax, view)
+
+
+def _scale_bar(ax, view):
+    wanted = 0.2 * PIXELS[0] * view.millimetres_per_pixel
+    decade = 10 ** np.floor(np.log10(wanted))
+    length = decade * max(n for n in (1, 2, 5) if n * decade <= wanted)
+    pixels = length / view.millimetres_per_pixel
+    x, y = PIXELS[0] - 30, PIXELS[1] - 22
+    ax.plot([x - pixels, x], [y, y], color="black", linewidth=2.2, solid_capstyle="butt")
+    ax.text(x - pixels / 2, y - 8, f"{length:g} mm", ha="center", va="bottom", fontsize=13)
+
+
+def _triad(ax, view):
+    """Directions of x, y, z, drawn long where they lie in the image."""
+    origin, length = np.array([75.0, PIXELS[1] - 75.0]), 46.0
+    for i, name in enumerate("xyz"):
+        step = length * np.array([view.right[i], -view.up[i]])
+        if np.linalg.norm(step) < 0.15 * length:
+            continue
+        ax.annotate(
+            "",
+            xy=origin + step,
+            xytext=origin,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": "#30363d",
+                "linewidth": 1.2,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
+        )
+        ax.text(
+            *(origin + step * (1 + 16 / np.linalg.norm(step))), name, ha="center", va="center", fontsize=13
+        )

@@ -1,0 +1,244 @@
+"""Target, reduced prediction and finite elements of one run against each other, all in target coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pneunet.base import se3
+from pneunet.base.errors import ConvergenceError
+from pneunet.base.strains import RodStrains
+from pneunet.design.report.labels import plain
+from pneunet.design.target.metrics import Errors, compare
+from pneunet.reduced.model import doubts, predict
+
+# what the words of the verdict mean, in % of length (RMS of points paired by arc length)
+CONFIRMS, ROUGHLY = 2.0, 5.0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Curves (n, 3) in mm in target coordinates, and `Errors` between them; None where a part is missing.
+
+    reduced: at the design pressure. solved: finite elements at their last pressure; reduced_at_solve,
+    strains: the reduced model re-evaluated there. nearest: (pressure in MPa, Errors) of the step nearest to
+    the target. notes: what a reader must know to read the numbers rightly.
+    """
+
+    reduced: np.ndarray | None
+    reduced_at_solve: np.ndarray | None
+    strains: RodStrains | None
+    solved: np.ndarray | None
+    reduced_target: Errors | None
+    solved_target: Errors | None
+    reduced_solved: Errors | None
+    notes: tuple
+    nearest: tuple | None = None
+
+    @classmethod
+    def of(cls, run, law):
+        design = run.design
+        doubted = doubts(design.manipulator, design.pressure, law)
+        doubted = doubts(design.manipulator, design.pressure, law)
+        notes = [f"The law '{law.name}' of the reduced model is in doubt: {text}." for text in doubted]
+        solved = at_solve = strains = None
+        reduced = _predict(design, design.pressure, law, notes)
+        if run.centreline is not None and reduced is not None:
+            difference = compare(run.centreline[1], reduced)
+            if difference.hausdorff > 1e-3 * difference.reference_length:
+                notes.append(
+                    f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives"
+                    " for design.toml now: it was edited, or predicted by another model. The report shows"
+                    " the model's curve."
+                )
+        nearest = None
+        if run.stale:
+            notes.append(
+                "The finite element solution in this folder is of another body: its dimensions, materials or"
+                " loads are not those of design.toml. It is not shown; run pneunet solve again."
+            )
+        if run.solve is not None:
+            notes += _loading(run)
+            if run.target is not None:
+                nearest = _nearest(run)
+            solved = se3.transform(design.base_pose, smooth(run.solve.s, run.solve.points))
+            if stopped_short(run):
+                last = f"{plain(run.solve.pressure * 1e3)} kPa"
+                notes.append(
+                    f"The finite element solution stops at {last}, below the design pressure of "
+                    f"{plain(design.pressure * 1e3)} kPa. It is compared with the reduced model at {last}; "
+                    "its distance to the target is that of a body not fully inflated."
+                )
+            at_solve = _predict(design, run.solve.pressure, law, notes)
+            if at_solve is not None:
+                each = [law.strains(s, run.solve.pressure) for s in design.manipulator.segments]
+                strains = RodStrains([s.e for s in each], [s.k for s in each])
+        return cls(
+            reduced,
+            at_solve,
+            strains,
+            solved,
+            _errors(reduced, run.target),
+            _errors(solved, run.target),
+            _errors(at_solve, solved),
+            tuple(dict.fromkeys(notes)),
+            nearest,
+        )
+
+
+def _loading(run):
+    """Sentences on what acted in the finite elements beside a growing pressure."""
+    record, notes = run.solve.record, []
+    if run.design.loads:
+        notes.append(
+            f"Dead loads act in the finite elements, {run.design.loads.text()}; the reduced model knows none."
+        )
+    if record.get("control", "pressure") != "pressure":
+        notes.append(
+            f"The finite elements were walked by {record['control']}: their last pressure is not one that was"
+            " asked for."
+        )
+    for point in record.get("limit_points", []):
+        notes.append(
+            f"The pressure has a limit point ({point['kind']}) of {plain(point['pressure_kPa'])} kPa at a"
+            f" cavity volume of {point['volume_mm3']:.4g} mm3: a body on a pressure source jumps there."
+        )
+    return notes
+
+
+def smooth(s, points, spacing=1.0):
+    """Points (m, 3) about `spacing` mm apart on the cubic spline through section origins (n, 3) at s (n,) mm:
+    the stations of the finite element solution lie a pitch apart, and their chords cut corners."""
+    fine = np.linspace(s[0], s[-1], int(np.ceil((s[-1] - s[0]) / spacing)) + 1)
+    return CubicSpline(s, points)(fine)
+
+
+def _nearest(run):
+    """(pressure in MPa, Errors) of the accepted step that is nearest to the target."""
+    tried = []
+    for pressure, s, points in run.solve.history:
+        tried.append((pressure, compare(se3.transform(run.design.base_pose, smooth(s, points)), run.target)))
+    return min(tried, key=lambda item: item[1].rms)
+
+
+def stopped_short(run):
+    """Whether the finite element solution ended below the design pressure (by more than rounding)."""
+    return run.solve is not None and run.solve.pressure < run.design.pressure * (1 - 1e-6)
+
+
+def _predict(design, pressure, law, notes):
+    try:
+        return predict(design.manipulator, pressure, law, base_pose=design.base_pose).points
+    except ConvergenceError as error:
+        notes.append(f"The reduced model has no solution at {plain(pressure * 1e3)} kPa: {error}")
+        return None
+
+
+def _errors(curve, reference):
+    return None if curve is None or reference is None else compare(curve, reference)
+
+
+def overlaps(run):
+    """Sentences on what overlaps in the finite element solution: walls, parts of the body; [] when nothing
+    does."""
+    solve, told = run.solve, []
+    if solve is None:
+        return told
+    if solve.walls_overlap:
+        depth = max([0.0] + [-distance for *_, distance in solve.walls])
+        now = f", by up to {depth:.2f} mm at the end" if depth > 0 else ""
+        told.append(
+            f"Walls overlap {_from(solve.record, 'first_touch')}{now}; contact is not part of this solution"
+        )
+    if solve.body_overlap:
+        depth = -solve.steps["body_distance_mm"][-1]
+        now = f", by up to {depth:.2f} mm at the end" if depth > 0 else ""
+        told.append(
+            "Parts of the body that are far apart along it overlap"
+            f" {_from(solve.record, 'first_body_touch')}{now}; their contact is not modelled"
+        )
+    return told
+
+
+def _from(record, name):
+    """'from 7.3 kPa on' of run.json's first touch."""
+    pressure, dead = record.get(f"{name}_kPa"), record.get(f"{name}_dead_load_fraction")
+    if pressure is None:
+        return "at some load"
+    return (
+        f"from {pressure:.2f} kPa on"
+        if pressure > 0 or not dead
+        else f"from {100 * dead:.3g} % of the dead loads on"
+    )
+
+
+def verdict(run, comparison):
+    """The result in one honest sentence, and what forbids to trust it: a solution in which walls overlap
+    confirms nothing."""
+    c, design = comparison, run.design
+    promise = ""
+    if c.reduced_target:
+        at = f"{plain(design.pressure * 1e3)} kPa"
+        promise = f"for {at} the reduced model promises the target within {_mm(c.reduced_target)}"
+    if c.solved is None:
+        told = promise or "there is neither a target nor a finite element solution to judge the prediction by"
+        return (
+            f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet."
+            if promise
+            else f"{told[0].upper()}{told[1:]}."
+        )
+    pressure = f"{plain(run.solve.pressure * 1e3)} kPa"
+    if c.reduced_solved is None:
+        sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"
+    else:
+        percent = c.reduced_solved.percent(c.reduced_solved.rms)
+        word = (
+            "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
+        )
+        if overlaps(run):
+            word = "is no test of"
+        sentence = (
+            f"At {pressure} the finite element solution of the whole manipulator {word} the reduced"
+            f" prediction: they differ by {_mm(c.reduced_solved)}, and |k| of a segment by up to"
+            f" {_strain_difference(run, c):.0f} %"
+        )
+    if promise:
+        sentence += f"; {promise}; at {pressure} the finite element body misses it by {_mm(c.solved_target)}"
+    elif c.solved_target:
+        sentence += f"; the finite element body misses the target by {_mm(c.solved_target)}"
+    if stopped_short(run):
+        asked = run.solve.record.get("pressure_kPa", design.pressure * 1e3)
+        walked = run.solve.record.get("control", "pressure") != "pressure"
+        reason = (
+            "ends below"
+            if walked
+            else (
+                "was asked for less than"
+                if asked < design.pressure * 1e3 * (1 - 1e-6)
+                else "stopped short of"
+            )
+        )
+        sentence += f"; it {reason} the design pressure, {plain(design.pressure * 1e3)} kPa"
+    if c.nearest and c.nearest[0] < run.solve.pressure:
+        sentence += (
+            f". Its step nearest to the target is at {plain(c.nearest[0] * 1e3)} kPa, with"
+            f" {_mm(c.nearest[1])}"
+        )
+    if overlaps(run):
+        sentence = "NOT PROVEN. " + ". ".join(
+            [sentence, *overlaps(run), "The finite element shape is not what a real body would take"]
+        )
+    return sentence + "."
+
+
+def _strain_difference(run, comparison):
+    """Largest |k_reduced - k_FE| over the segments, % of the largest |k| in FE: shows what positions do
+    not."""
+    solved = np.linalg.norm(run.solve.strains.k, axis=1)
+    return 100 * float(
+        np.linalg.norm(comparison.strains.k - run.solve.strains.k, axis=1).max() / solved.max()
+    )
+
+
+def _mm(errors):
+    return f"{errors.rms:.2f} mm RMS ({errors.percent(errors.rms):.1f} % of length)"

@@ -1,0 +1,298 @@
+"""The dimensioned drawing of a manipulator: plan, side view, sections with every dimension in mm, table of
+segments."""
+
+from pneunet.base.files.atomic import atomic_path
+from pneunet.design.report.dimensions import SheetView
+from pneunet.design.report.labels import REDUCED, plain, segment_colour, segment_mode
+from pneunet.design.report.section_views import cross_section, normal_section, section_groups, section_scale
+from pneunet.geometry.parameters import TWISTING
+
+SHEET_WIDTH = 16.5  # inches, the width of A3
+MARGIN = 0.45
+COLUMNS = 4  # section panels in a row
+PANEL_WIDTH = (SHEET_WIDTH - 2 * MARGIN) / COLUMNS
+PANEL_HEIGHT = 3.6
+INK = "#1b1f24"
+
+
+def segment_table(manipulator):
+    """Rows (label, [text for every segment]) of all dimensions, lengths in mm, for the drawing and the
+    report."""
+
+    def row(label, value):
+        return label, [value(s) for s in manipulator.segments]
+
+    layers = [
+        row(
+            "stiff layer, bottom of the base",
+            lambda s: plain(s.layer_thickness) if s.layer_thickness else "-",
+        ),
+        row("its material", lambda s: s.layer_material.name if s.layer_thickness else "-"),
+    ]
+    return [
+        row("mode", segment_mode),
+        row("angle to the axis, deg", lambda s: plain(s.angle)),
+        row(
+            "chambers",
+            lambda s: f"{s.chambers} pair{'s' * (s.chambers > 1)}" if s.kind == TWISTING else f"{s.chambers}",
+        ),
+        row("axial pitch", lambda s: plain(s.pitch)),
+        row("width", lambda s: plain(s.width)),
+        row("chamber height (cavity)", lambda s: plain(s.chamber_height)),
+        row("cavity thickness, normal", lambda s: plain(s.cavity_thickness)),
+        row("wall, normal", lambda s: plain(s.wall)),
+        row("gap, normal", lambda s: plain(s.gap)),
+        row("top wall", lambda s: plain(s.top_wall)),
+        row("side wall", lambda s: plain(s.side_wall)),
+        row("base thickness", lambda s: "-" if s.kind == TWISTING else plain(s.base_thickness)),
+        row("roof over the channel", lambda s: plain(s.roof)),
+        row("core thickness", lambda s: plain(s.core_top - s.core_bottom)),
+        row("channel, width x height", lambda s: f"{plain(s.channel_width)} x {plain(s.channel_height)}"),
+        row("cavity floor above the axis", lambda s: plain(s.cavity_floor)),
+        row("bare core beyond the chambers", lambda s: plain(s.end_margin)),
+        row("passive length, each end", lambda s: plain(s.end_length)),
+        row("active length", lambda s: plain(s.active_length)),
+        row("length", lambda s: plain(s.length)),
+        row("material", lambda s: s.material.name),
+        row("shear modulus, MPa", lambda s: plain(s.material.mu, 4)),
+        *(layers if any(s.layer_thickness for s in manipulator.segments) else []),
+    ]
+
+
+def chamber_plan(segment, x, thickness, half_width, side):
+    """Plan corners (4, 2) in mm of a chamber or cavity centred at x; side -1 is the set turned half a turn
+    about x."""
+    half, slant = thickness / segment.sin / 2, segment.cot * half_width * side
+    return [
+        (x - slant - half, -half_width),
+        (x - slant + half, -half_width),
+        (x + slant + half, half_width),
+        (x + slant - half, half_width),
+    ]
+
+
+def draw_drawing(design, path):
+    """Write the drawing of a `geometry.designfile.Design` as a PNG (or SVG, PDF: by the suffix of `path`)."""
+    figure = drawing_figure(design)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=130)
+
+
+def drawing_figure(design):
+    """The drawing as a matplotlib Figure, `SHEET_WIDTH` inches wide and as high as its content."""
+    from matplotlib.figure import Figure
+
+    manipulator = design.manipulator
+    groups = section_groups(manipulator)
+    rows = segment_table(manipulator)
+    scale = min((SHEET_WIDTH - 2 * MARGIN - 1.7) / manipulator.length, 0.16)
+    plan_height = scale * max(s.width for s in manipulator.segments) + 1.9
+    side_height = (
+        scale
+        * (
+            max(s.chamber_top for s in manipulator.segments)
+            - min(s.chamber_bottom for s in manipulator.segments)
+        )
+        + 1.7
+    )
+    panel_rows = -(-(2 * len(groups) + 2) // COLUMNS)
+    height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
+    figure = Figure(figsize=(SHEET_WIDTH, height), facecolor="white")
+    _frame(figure, design, height)
+
+    top = height - MARGIN - 0.75
+    width = SHEET_WIDTH - 2 * MARGIN
+    _plan(
+        SheetView(
+            figure,
+            (MARGIN, top - plan_height, width, plan_height),
+            scale,
+            manipulator.length / 2,
+            0.0,
+            up=-0.4,
+        ),
+        manipulator,
+    )
+    top -= plan_height
+    middle = (
+        max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)
+    ) / 2
+    _side(
+        SheetView(
+            figure,
+            (MARGIN, top - side_height, width, side_height),
+            scale,
+            manipulator.length / 2,
+            middle,
+            up=0.48,
+        ),
+        manipulator,
+    )
+    top -= side_height
+
+    panels = [(draw, group) for group in groups for draw in (cross_section, normal_section)]
+    panel_scale = min(section_scale(manipulator.segments[g[0]], PANEL_WIDTH, PANEL_HEIGHT) for g in groups)
+    for number, (draw, group) in enumerate(panels):
+        left = MARGIN + PANEL_WIDTH * (number % COLUMNS)
+        bottom = top - PANEL_HEIGHT * (number // COLUMNS + 1)
+        draw(figure, (left, bottom, PANEL_WIDTH, PANEL_HEIGHT), panel_scale, manipulator, group)
+    left = MARGIN + PANEL_WIDTH * (len(panels) % COLUMNS)
+    bottom = top - PANEL_HEIGHT * (len(panels) // COLUMNS + 1)
+    _table(figure, (left + 0.1, bottom + 0.1, 2 * PANEL_WIDTH - 0.2, PANEL_HEIGHT - 0.2), rows)
+    return figure
+
+
+def _frame(figure, design, height):
+    from matplotlib.patches import Rectangle
+
+    figure.add_artist(
+        Rectangle((0.012, 0.2 / height), 0.976, 1 - 0.4 / height, fill=False, edgecolor=INK, linewidth=1.2)
+    )
+    manipulator = design.manipulator
+    x, y = MARGIN / SHEET_WIDTH, 1 - (MARGIN + 0.1) / height
+    figure.text(x, y, design.name, fontsize=17, weight="bold", color=INK, va="top")
+    facts = (
+        f"pneu-net soft manipulator, {len(manipulator.segments)}"
+        f" segment{'s' * (len(manipulator.segments) > 1)}, {manipulator.chambers} chambers/pairs, total"
+        f" length {plain(manipulator.length)} mm, design pressure {plain(design.pressure * 1e3)} kPa"
+    )
+    figure.text(x, y - 0.33 / height, facts, fontsize=10, color=INK, va="top")
+    figure.text(1 - x, y, "all dimensions in mm", fontsize=10, color=INK, va="top", ha="right")
+    materials = {m.name: m for m in manipulator.materials}.values()
+    told = "; ".join(
+        f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials
+    )
+    notes = (
+        f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The'
+        " lower chambers of a twisting segment are the upper ones turned by half a turn about x. One cavity:"
+        " the channel joins all chambers."
+    )
+    figure.text(x, (MARGIN + 0.42) / height, notes, fontsize=8.5, color=INK, va="top", linespacing=1.4)
+
+
+def _plan(view, manipulator):
+    """Seen from above: upper chambers solid, lower ones and the channel dashed."""
+    start_of_channel = manipulator.segments[0].chamber_positions[0]
+    end_of_channel = manipulator.starts[-1] + manipulator.segments[-1].chamber_positions[-1]
+    short = min(s.length for s in manipulator.segments) * view.scale < 1.5
+    highest = max(s.width for s in manipulator.segments) / 2
+    view.title(-view.mm(0.28), view.mm(0.3), "plan")
+    for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
+        half = s.width / 2
+        view.polygon(
+            [(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)],
+            face="#f1f3f5",
+        )
+        for side in reversed(s.sides):
+            for x in start + s.chamber_positions:
+                outline = chamber_plan(s, x, s.chamber_thickness, half, side)
+                cavity = chamber_plan(s, x, s.cavity_thickness, s.cavity_width / 2, side)
+                if side > 0:
+                    view.polygon(outline, face=segment_colour(i), width=0.8)
+                    view.polygon(cavity, face="white", width=0.5, alpha=0.55)
+                else:
+                    view.polygon(outline, face="none", width=0.6, style=(0, (3, 2)))
+        x0, x1 = max(start, start_of_channel), min(start + s.length, end_of_channel)
+        for y in (-s.channel_width / 2, s.channel_width / 2):
+            view.line([(x0, y), (x1, y)], width=0.6, style=(0, (5, 2)))
+        first = start + s.chamber_positions[0]
+        view.angle((first + half * s.cot, half), s.angle, 0.42)
+        level = highest + view.mm(0.92 + (0.3 if short and i % 2 else 0.0))
+        view.balloon(
+            start + s.length / 2, level, i + 1, f"{segment_mode(s)} {plain(s.angle)}°", segment_colour(i)
+        )
+        if s.chambers > 1:
+            x = first - half * s.cot
+            view.horizontal(x, x + s.pitch, -half, -half - view.mm(0.3), f"pitch {plain(s.pitch)}")
+    view.line(
+        [(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)],
+        width=0.6,
+        style=(0, (12, 3, 2, 3)),
+        colour=REDUCED,
+    )
+    view.text(-view.mm(0.28), 0, "base", ha="right")
+    view.text(manipulator.length + view.mm(0.28), 0, "tip", ha="left")
+
+
+def _side(view, manipulator):
+    """Seen along y: the near end faces of the chambers dark, their slanted sides behind them light."""
+    view.title(-view.mm(0.28), view.mm(0.3), "side view")
+    ends, lengths = [], []
+    for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
+        for side in s.sides:
+            z0, z1 = side * s.core_top, side * s.chamber_top
+            for shade, width in ((0.35, None), (1.0, 0.7)):
+                for x in start + s.chamber_positions:
+                    corners = [c[0] for c in chamber_plan(s, x, s.chamber_thickness, s.width / 2, side)]
+                    x0, x1 = (min(corners), max(corners)) if width is None else (corners[0], corners[1])
+                    view.polygon(
+                        [(x0, z0), (x1, z0), (x1, z1), (x0, z1)],
+                        face=segment_colour(i),
+                        width=width or 0.4,
+                        alpha=shade,
+                    )
+        view.polygon(
+            [
+                (start, s.core_bottom),
+                (start + s.length, s.core_bottom),
+                (start + s.length, s.core_top),
+                (start, s.core_top),
+            ],
+            face="#e4e8ec",
+            width=0.9,
+        )
+        a, b = start + s.end_length, start + s.end_length + s.active_length
+        ends += [(start, a, plain(s.end_length)), (b, start + s.length, plain(s.end_length))]
+        lengths.append((start, start + s.length, plain(s.length), (a, b, plain(s.active_length))))
+    view.line(
+        [(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)],
+        width=0.6,
+        style=(0, (12, 3, 2, 3)),
+        colour=REDUCED,
+    )
+    low = min(s.chamber_bottom for s in manipulator.segments)
+    view.chain_below(ends, low, low - view.mm(0.25))
+    for start, stop, text, (a, b, active) in lengths:
+        view.between(a, b, low - view.mm(0.25), active)
+        view.horizontal(start, stop, low, low - view.mm(0.68), text)
+    view.horizontal(
+        0.0, manipulator.length, low, low - view.mm(0.98), f"total length {plain(manipulator.length)}"
+    )
+    view.text(-view.mm(0.1), low - view.mm(0.25), "passive | active", ha="right", size=6.5)
+    view.text(-view.mm(0.1), low - view.mm(0.68), "segment", ha="right", size=6.5)
+
+
+def _table(figure, rectangle, rows):
+    """The segment table, one column a segment."""
+    view = SheetView(figure, rectangle, 1.0, rectangle[2] / 2, rectangle[3] / 2)
+    width, height = rectangle[2], rectangle[3]
+    step = height / (len(rows) + 1)
+    count = len(rows[0][1])
+    label_width = 2.3
+    cell = min((width - label_width) / count, 1.5)
+    right = label_width + cell * count
+    y = height - step
+    view.text(0.06, y + step / 2, "segment", weight="bold", size=8, ha="left")
+    for i in range(count):
+        x = label_width + cell * i
+        view.polygon(
+            [(x, y), (x + cell, y), (x + cell, height), (x, height)], face=segment_colour(i), width=0
+        )
+        view.text(x + cell / 2, y + step / 2, str(i + 1), weight="bold", size=8)
+    size = min(8.0, 72 * step * 0.66)
+    for number, (label, values) in enumerate(rows):
+        y -= step
+        if number % 2:
+            view.polygon([(0, y), (right, y), (right, y + step), (0, y + step)], face="#f1f3f5", width=0)
+        view.text(0.06, y + step / 2, label, size=size, ha="left")
+        for i, value in enumerate(values):
+            # long words (material names) are cut to what the column holds
+            room = int(cell * 72 / (0.56 * size))
+            view.text(
+                label_width + cell * (i + 0.5),
+                y + step / 2,
+                value if len(value) <= room else value[: room - 1] + "…",
+                size=size,
+            )
+    view.polygon([(0, 0), (right, 0), (right, height), (0, height)], face="none", width=0.8)
+    view.line([(0, height - step), (right, height - step)], width=0.8)

@@ -1,0 +1,321 @@
+"""The report's pictures; each function writes one PNG or several and returns [(file name, caption)]."""
+
+import numpy as np
+
+from pneunet.base.errors import ConvergenceError
+from pneunet.base.pictures import rendering
+from pneunet.base.pictures.rendering import figure, save
+from pneunet.base.pictures.walls import TOUCHING, draw_walls
+from pneunet.design.report import bodies
+from pneunet.design.report.drawing import chamber_plan
+from pneunet.design.report.labels import FINITE_ELEMENTS, plain, segment_colour
+from pneunet.design.report.pictures import curve_panels, legend, segment_bands
+from pneunet.reduced.model import predict
+
+
+def _mark(run):
+    """What the titles of finite element pictures end with when parts overlap in them."""
+    return " (overlaps)" * bool(run.solve and (run.solve.walls_overlap or run.solve.body_overlap))
+
+
+def curve_picture(run, comparison, folder):
+    """Target, reduced and finite element centrelines over each other."""
+    design = run.design
+    curves = []
+    if run.target is not None:
+        curves.append(("target", run.target, "target"))
+    reduced, pressure = comparison.reduced, design.pressure
+    if comparison.solved is not None:
+        reduced, pressure = comparison.reduced_at_solve, run.solve.pressure
+    if reduced is not None:
+        curves.append((f"reduced, {plain(pressure * 1e3)} kPa", reduced, "reduced"))
+    bands = None
+    if comparison.solved is not None:
+        label = f"finite elements, {plain(pressure * 1e3)} kPa{_mark(run)}"
+        curves.append((label, comparison.solved, "finite elements"))
+        s = np.linspace(run.solve.s[0], run.solve.s[-1], len(comparison.solved))
+        bands = segment_bands(design.manipulator, s, comparison.solved)
+    if not curves:
+        return []
+    fig = figure(11.0, 6.2)
+    curve_panels(fig, curves, bands)
+    legend(fig, curves, design.manipulator)
+    save(fig, folder / "curves.png", dpi=110)
+    where = "finite element curve" if bands else "picture"
+    return [
+        (
+            "curves.png",
+            (
+                f"Centrelines in 3D and in two projections, equal scale; segments coloured along the {where}."
+                if bands
+                else "Centrelines in 3D and in two projections, equal scale."
+            ),
+        )
+    ]
+
+
+def body_pictures(run, comparison, law, folder):
+    """Target, reduced body, finite element body and the reference body from one camera at one scale; fields
+    on the finite element body."""
+    design = run.design
+    pressure = run.solve.pressure if run.solve else design.pressure
+    reduced = None
+    if (comparison.reduced_at_solve if run.solve else comparison.reduced) is not None:
+        reduced = bodies.body_mesh(design.manipulator, pressure, law, design.base_pose)
+    rest = bodies.body_mesh(design.manipulator, 0.0, law, design.base_pose)
+    solved = None
+    if run.solve is not None and run.solve.solution is not None:
+        solved, solved_edges = bodies.deformed_surface(
+            bodies.read_solution(run.solve.solution), design.base_pose
+        )
+    target = None if run.target is None else bodies.tube(run.target)
+    curves = [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
+    held = [m.points for m in (reduced, solved) if m is not None] + curves
+    view = rendering.view_of(np.vstack(held or [rest.points]))
+    kPa = f"{plain(pressure * 1e3)} kPa"
+    with_target = [target] if target else []
+    out = []
+
+    def picture(name, things, title, caption, bar=None):
+        rendering.write_picture(folder / name, view, rendering.render(view, things), title, bar)
+        out.append((name, caption))
+
+    if target:
+        picture(
+            "target.png",
+            with_target,
+            "target",
+            "The target curve (black in the other pictures of this row too, where the body does not hide"
+            " it).",
+        )
+    if reduced is not None:
+        picture(
+            "reduced.png",
+            bodies.painted(reduced) + with_target,
+            f"reduced model, {kPa}",
+            "The reduced model's body, coloured by segment.",
+        )
+    if solved is not None:
+        plainly = {"color": FINITE_ELEMENTS, "opacity": 1.0}
+        picture(
+            "fe.png",
+            [(solved, plainly), solved_edges, *with_target],
+            f"finite elements, {kPa}{_mark(run)}",
+            "The finite element body.",
+        )
+        for name, field, label, cmap in (
+            ("fe_displacement.png", "displacement length", "displacement (mm)", "viridis"),
+            ("fe_stretch.png", "stretch", "largest principal stretch (-)", "YlOrRd"),
+        ):
+            if field not in solved.point_data:
+                continue
+            values = solved.point_data[field]
+            top = np.percentile(values, 99.5)
+            limits = (float(values.min()), float(max(top, values.min() + 1e-9)))
+            beyond = (
+                f"; 0.5 % of its nodes lie above the scale, up to {values.max():.2f}"
+                if values.max() > 1.01 * top
+                else ""
+            )
+            if field == "stretch":
+                beyond += f"; the largest inside the elements is {run.solve.steps['largest_stretch'][-1]:.2f}"
+            picture(
+                name,
+                [rendering.coloured(solved, field, limits, cmap), solved_edges],
+                f"{label.split(' (')[0]}, {kPa}{_mark(run)}",
+                f"Finite element body coloured by {label.split(' (')[0]}{beyond}.",
+                (label, limits, cmap),
+            )
+    rest_view = rendering.view_of(rest.points)
+    rendering.write_picture(
+        folder / "reference.png",
+        rest_view,
+        rendering.render(rest_view, bodies.painted(rest)),
+        "reference body, 0 kPa",
+    )
+    out.append(("reference.png", "The body at rest (its own scale)."))
+    return out
+
+
+def history_picture(run, law, folder):
+    """Tip, volume, wall distance and stretch against pressure; the reduced tip dashed."""
+    steps, design = run.solve.steps, run.design
+    p = steps["pressure_kPa"]
+    fig = figure(10.0, 6.6)
+    axes = fig.subplots(2, 2)
+    tips = []
+    for level in np.linspace(0, p.max(), 15):
+        try:
+            tips.append((level, *predict(design.manipulator, level * 1e-3, law).points[-1]))
+        except ConvergenceError:
+            break
+    tips = np.array(tips)
+    for i, (name, colour) in enumerate(zip("xyz", ("#1f6fb2", "#2f9e44", "#d9480f"))):
+        axes[0, 0].plot(
+            p,
+            steps[f"tip_{name}_mm"],
+            "o-",
+            color=colour,
+            markersize=3,
+            linewidth=1.4,
+            label=f"{name}, finite elements",
+        )
+        if len(tips):
+            axes[0, 0].plot(
+                tips[:, 0], tips[:, i + 1], "--", color=colour, linewidth=1.2, label=f"{name}, reduced"
+            )
+    axes[0, 0].set_ylabel("tip, body axes (mm)")
+    axes[0, 0].legend(fontsize=7, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+    for ax, column, label in (
+        (axes[0, 1], "volume_mm3", "cavity volume (mm³)"),
+        (axes[1, 0], "smallest_wall_distance_mm", "smallest wall distance (mm)"),
+        (axes[1, 1], "largest_stretch", "largest stretch (-)"),
+    ):
+        values = np.where(np.isfinite(steps[column]), steps[column], np.nan)  # no gaps, no distance: infinity
+        ax.plot(p, values, "o-", color=FINITE_ELEMENTS, markersize=3, linewidth=1.4)
+        ax.set_ylabel(label)
+    between = steps["body_distance_mm"]
+    if between.min() < 2 * max(s.gap for s in design.manipulator.segments):
+        axes[1, 0].plot(
+            p,
+            between,
+            "s--",
+            color="#862e9c",
+            markersize=3,
+            linewidth=1.2,
+            label="parts far apart along the body",
+        )
+        axes[1, 0].legend(fontsize=7, frameon=False)
+    low = axes[1, 0].get_ylim()[0]
+    axes[1, 0].axhline(0.0, color="#c92a2a", linewidth=1.0)
+    axes[1, 0].set_ylim(bottom=min(low, -0.05))
+    axes[1, 0].axhspan(axes[1, 0].get_ylim()[0], 0.0, color="#c92a2a", alpha=0.12)
+    for ax in axes.flat:
+        ax.set_xlabel("pressure (kPa)")
+        ax.axvline(design.pressure * 1e3, color="#868e96", linewidth=0.9, linestyle=":")
+        ax.set_xlim(left=0.0)
+        ax.grid(True, linewidth=0.4, alpha=0.6)
+    fig.subplots_adjust(left=0.08, right=0.98, top=0.92, bottom=0.08, wspace=0.24, hspace=0.28)
+    save(fig, folder / "history.png", dpi=110)
+    return [
+        (
+            "history.png",
+            (
+                "Load history of the finite element solution, one mark an accepted step; the reduced model's"
+                " tip dashed; dotted: design pressure; red: below zero walls overlap."
+            ),
+        )
+    ]
+
+
+def touching_picture(run, folder):
+    """The deformed body, its facing walls coloured by their distance; [] without fields or gaps."""
+    if run.solve.solution is None:
+        return []
+    surface, (lines, _) = bodies.deformed_surface(
+        bodies.read_solution(run.solve.solution), run.design.base_pose
+    )
+    walls = bodies.facing_walls(surface)
+    if walls is None:
+        return []
+    gap = max(s.gap for s in run.design.manipulator.segments)
+    touching = TOUCHING * gap * run.solve.contact
+    around = f"is nearer than {touching:.2g} mm: contact" if touching else "lies behind the other: overlap"
+    title = f"distance of walls, {plain(run.solve.pressure * 1e3)} kPa{_mark(run)}"
+    draw_walls(folder / "fe_walls.png", surface, lines, walls, gap, title, touching)
+    return [
+        (
+            "fe_walls.png",
+            (
+                "Finite element body, last step; walls that face each other across a gap coloured by their"
+                f" distance. A black line surrounds where one {around}."
+            ),
+        )
+    ]
+
+
+def wall_picture(run, folder):
+    """Plan strips of the upper and the lower side, every gap coloured by the smallest distance of its
+    walls."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import TwoSlopeNorm
+    from matplotlib.patches import Polygon
+
+    manipulator = run.design.manipulator
+    walls = {(a, b, c): d for a, b, c, d in run.solve.walls}
+    if not walls:
+        return []
+    sides = sorted({side for _, side, _ in walls}, reverse=True)
+    top = max(s.gap for s in manipulator.segments)
+    # red = overlap, white = touching, blue = open; the scale reaches as far down as the deepest overlap
+    norm = TwoSlopeNorm(0.0, min(-0.25 * top, *walls.values()), max(top, *walls.values()))
+    half = max(s.width for s in manipulator.segments) / 2
+    strip = 9.6 * (2 * half + 3) / manipulator.length
+    height = len(sides) * (strip + 0.45) + 0.95
+    fig = figure(10.6, height)
+    for row, side in enumerate(sides):
+        ax = fig.add_axes([0.07, 1 - (row + 1) * (strip + 0.45) / height, 0.9, strip / height])
+        for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
+            w = s.width / 2
+            ax.add_patch(
+                Polygon(
+                    [(start, -w), (start + s.length, -w), (start + s.length, w), (start, w)],
+                    facecolor="#e9ecef",
+                    edgecolor="#495057",
+                    linewidth=0.8,
+                )
+            )
+            if side not in s.sides:
+                continue
+            for x in start + s.chamber_positions:
+                ax.add_patch(
+                    Polygon(
+                        chamber_plan(s, x, s.chamber_thickness, w, side),
+                        facecolor=segment_colour(i),
+                        alpha=0.45,
+                        edgecolor="none",
+                    )
+                )
+            for gap, x in enumerate((start + s.chamber_positions)[:-1] + s.pitch / 2, start=1):
+                distance = walls.get((i + 1, side, gap))
+                if distance is not None:
+                    ax.add_patch(
+                        Polygon(
+                            chamber_plan(s, x, s.gap, w, side),
+                            facecolor=ScalarMappable(norm, "RdBu").to_rgba(distance),
+                            edgecolor="#212529",
+                            linewidth=0.7,
+                        )
+                    )
+                    if distance < 0 and not run.solve.contact:
+                        ax.plot(
+                            x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False
+                        )
+        ax.set_xlim(-1, manipulator.length + 1)
+        ax.set_ylim(-half - 1.5, half + 1.5)
+        ax.set_title(
+            "upper chambers" if side > 0 else "lower chambers (seen through the body)",
+            fontsize=9,
+            loc="left",
+            pad=7,
+        )
+        ax.set_yticks([])
+        ax.tick_params(labelsize=8)
+        for edge in ("left", "right", "top"):
+            ax.spines[edge].set_visible(False)
+    fig.colorbar(
+        ScalarMappable(norm, "RdBu"),
+        cax=fig.add_axes([0.25, 0.45 / height, 0.5, 0.13 / height]),
+        orientation="horizontal",
+        label="smallest distance of the walls facing each other (mm); negative = overlap",
+    )
+    save(fig, folder / "walls.png", dpi=110)
+    return [
+        (
+            "walls.png",
+            (
+                "Plan of the body at rest (x in mm), gaps coloured by the smallest distance of their walls,"
+                " last step. Red triangles mark overlap."
+            ),
+        )
+    ]

@@ -1,0 +1,139 @@
+"""Pictures of centrelines in matplotlib: 3D with equal scale, two projections, and the picture of a
+design."""
+
+import numpy as np
+
+from pneunet.base.pictures.rendering import camera_angles, figure, save
+from pneunet.design.report.labels import STYLES, plain, segment_colour, segment_name, significant
+from pneunet.design.report.rundata import read_run
+
+
+def equal_axes_3d(ax, points, pad=0.06):
+    """Limits of 3D axes that hold points (n, 3) at one scale in x, y and z; labels in mm."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
+    size = (high - low).max()
+    # a flat curve still gets a box with some depth
+    half = np.maximum((high - low) / 2, 0.12 * size) + pad * size
+    middle = (low + high) / 2
+    ax.set_box_aspect(tuple(half), zoom=0.95)
+    for i, name in enumerate("xyz"):
+        getattr(ax, f"set_{name}lim")(middle[i] - half[i], middle[i] + half[i])
+        getattr(ax, f"{name}axis").set_major_locator(MaxNLocator(max(2, round(6 * half[i] / half.max()))))
+        getattr(ax, f"set_{name}label")(f"{name} (mm)", labelpad=2 + 6 * half[i] / half.max())
+    ax.tick_params(labelsize=8, pad=1)
+
+
+def curve_panels(figure, curves, segments=None, bottom=0.06):
+    """3D view and the x-y and x-z projections of curves.
+
+    curves : [(label, points (n, 3) in mm, style of STYLES)]. segments : [(colour, points)], bands under the
+    curves.
+    """
+    everything = np.vstack([points for _, points, _ in curves])
+    grid = figure.add_gridspec(
+        2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32
+    )
+    ax = figure.add_subplot(grid[:, 0], projection="3d")
+    ax.view_init(*camera_angles(everything))
+    band = {"linewidth": 9, "alpha": 0.75, "solid_capstyle": "butt", "zorder": 1}
+    for colour, points in segments or []:
+        ax.plot(*points.T, color=colour, **band)
+    for label, points, style in curves:
+        ax.plot(*points.T, label=label, **STYLES[style])
+    ax.scatter(*curves[0][1][0], color="black", s=22, zorder=5)
+    ax.text(*curves[0][1][0], "  base", fontsize=8)
+    equal_axes_3d(ax, everything)
+    for row, (i, j) in enumerate([(0, 1), (0, 2)]):
+        ax = figure.add_subplot(grid[row, 1])
+        for colour, points in segments or []:
+            ax.plot(points[:, i], points[:, j], color=colour, **band)
+        for _, points, style in curves:
+            ax.plot(points[:, i], points[:, j], **STYLES[style])
+        ax.plot(*everything[0, [i, j]], "ko", markersize=4)
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.margins(0.08)
+        ax.set_xlabel(f"{'xyz'[i]} (mm)", labelpad=1)
+        ax.set_ylabel(f"{'xyz'[j]} (mm)", labelpad=1)
+        ax.grid(True, linewidth=0.4, alpha=0.6)
+        ax.tick_params(labelsize=8)
+
+
+def segment_bands(manipulator, s, points):
+    """[(colour, points)] of the stretches of a centreline (s undeformed, mm) that belong to each segment."""
+    ends = manipulator.starts + [seg.length for seg in manipulator.segments]
+    bands = []
+    for i, (start, end) in enumerate(zip(manipulator.starts, ends)):
+        inside = np.concatenate([[start], s[(s > start) & (s < end)], [end]])
+        bands.append(
+            (segment_colour(i), np.column_stack([np.interp(inside, s, column) for column in points.T]))
+        )
+    return bands
+
+
+def legend(figure, curves, manipulator):
+    """At the top right: what the lines are, and below it the segments' colours with their names."""
+    from matplotlib.lines import Line2D
+
+    lines = [Line2D([], [], label=label, **STYLES[style]) for label, _, style in curves]
+    bands = [
+        Line2D([], [], color=segment_colour(i), linewidth=9, alpha=0.75, label=f"{i + 1}  {segment_name(s)}")
+        for i, s in enumerate(manipulator.segments)
+    ]
+    for handles, height in ((lines, 0.995), (bands, 0.955)):
+        figure.legend(
+            handles=handles,
+            loc="upper right",
+            ncols=min(len(handles), 5),
+            fontsize=8.5,
+            frameon=False,
+            bbox_to_anchor=(0.985, height),
+            handlelength=2.4,
+            columnspacing=1.6,
+        )
+
+
+def error_caption(errors):
+    """The four errors and the length mismatch (`design.target.metrics.Errors`) in two lines."""
+
+    def both(mm):
+        return f"{mm:.2f} mm ({errors.percent(mm):.1f} %)"
+
+    return (
+        f"RMS paired by arc length {both(errors.rms)},  two-sided Hausdorff {both(errors.hausdorff)},  "
+        f"tip {both(errors.tip)}\n"
+        f"Eq. 27 sum over {errors.eq27_points} points {significant(errors.eq27)} mm²,  "
+        f"length {errors.length:.1f} mm, wanted {errors.reference_length:.1f} mm "
+        f"({errors.percent(errors.length_mismatch):+.1f} %)    [% of the wanted length]"
+    )
+
+
+def draw_design(directory):
+    """Write design.png of a run directory: target against the reduced prediction, errors, segments,
+    pressure."""
+    from pneunet.design.target.metrics import compare
+
+    run = read_run(directory)
+    s, points = run.centreline
+    curves = [("reduced prediction", points, "reduced")]
+    caption = "no target.csv beside the design: only the prediction is shown"
+    if run.target is not None:
+        curves.insert(0, ("target", run.target, "target"))
+        caption = error_caption(compare(points, run.target))
+    design = run.design
+    fig = figure(12.0, 7.0)
+    curve_panels(fig, curves, segment_bands(design.manipulator, s, points), bottom=0.15)
+    legend(fig, curves, design.manipulator)
+    fig.text(0.025, 0.975, design.name, fontsize=15, weight="bold", va="top")
+    fig.text(
+        0.025,
+        0.925,
+        f"{plain(design.pressure * 1e3)} kPa, {design.manipulator.chambers} chambers, "
+        f"{plain(design.manipulator.length, 1)} mm long at rest",
+        fontsize=10,
+        va="top",
+    )
+    fig.text(0.025, 0.02, caption, fontsize=9, linespacing=1.5)
+    save(fig, run.directory / "design.png")
+    return run.directory / "design.png"

@@ -1,0 +1,344 @@
+"""`pneunet report`: one self-contained page that shows what was asked, designed, predicted and proven."""
+
+import base64
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from pneunet.base.files.atomic import output_directory, write_text
+from pneunet.base.files.record import revision
+from pneunet.design.report import figures
+from pneunet.design.report.comparison import CONFIRMS, ROUGHLY, Comparison, overlaps, stopped_short, verdict
+from pneunet.design.report.drawing import draw_drawing, segment_table
+from pneunet.design.report.labels import plain, segment_name, significant
+from pneunet.design.report.rundata import read_run
+from pneunet.reduced.choice import choose_law
+
+STYLE = """
+:root { color-scheme: light; }
+body {
+  font: 16px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: #1b1f24; background: #fff;
+  margin: 0 auto; max-width: 1080px; padding: 1rem;
+}
+h1 { font-size: 1.7rem; margin: .5rem 0; }
+h2 { font-size: 1.2rem; border-bottom: 2px solid #dee2e6; margin-top: 2.2rem; padding-bottom: .2rem; }
+.verdict { font-size: 1.1rem; border-left: 5px solid #1f6fb2; background: #eef5fb; padding: .7rem 1rem; }
+.alarm {
+  border-left: 5px solid #c92a2a; background: #fff0f0; color: #861c1c; padding: .7rem 1rem; font-weight: 600;
+}
+.note { border-left: 5px solid #f08c00; background: #fff8eb; padding: .5rem 1rem; margin: .6rem 0; }
+.missing { color: #6b747d; font-style: italic; }
+.table { overflow-x: auto; margin: .8rem 0; }
+table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e8ec; white-space: nowrap; }
+th { background: #f1f3f5; }
+th:first-child, td:first-child { text-align: left; }
+tr.head td { font-weight: 600; background: #f8f9fa; }
+td.long { white-space: normal; text-align: left; word-break: break-word; }
+.grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: .8rem; }
+figure { margin: .8rem 0; }
+.grid figure { margin: 0; }
+img { width: 100%; height: auto; border: 1px solid #e4e8ec; }
+figcaption { font-size: .85rem; color: #4b545c; }
+footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
+@media print {
+  body { max-width: none; font-size: 11pt; padding: 0; }
+  figure, tr, .verdict, .alarm { break-inside: avoid; }
+  h2 { break-after: avoid; }
+  .grid { grid-template-columns: repeat(3, 1fr); }
+  .table { overflow: visible; }
+}
+"""
+
+
+def write_report(directory, say=print, law=None):
+    """Write directory/report.html and its pictures in directory/report/; returns the path of the page.
+
+    law: a SegmentLaw, by default the one that the folder was designed with. Shows what is there: without a
+    mesh or a finite element solution it says so. InputError without design.toml.
+    """
+    run = read_run(directory)
+    law = choose_law(run.law) if law is None else law
+    folder = output_directory(run.directory / "report")
+    comparison = Comparison.of(run, law)
+    draw_drawing(run.design, folder / "drawing.png")
+    sections = [
+        ("Target, prediction, finite elements", _shapes(run, comparison, law, folder)),
+        ("Errors", _errors(comparison, run)),
+        ("Strains of the segments", _strains(run, comparison)),
+        ("Load history", _history(run, law, folder)),
+        ("Where walls touch", _walls(run, folder)),
+        ("Drawing, dimensions, material", _drawing(run, folder)),
+        ("How it was computed", _computed(run)),
+    ]
+    body = _headline(run, comparison) + "".join(
+        f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections
+    )
+    page = (
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(run.design.name)}: pneunet report</title><style>{STYLE}</style></head><body>{body}"
+        f"<footer>pneunet report, revision {escape(revision())}. Lengths in mm, pressures in kPa.</footer>"
+        "</body></html>\n"
+    )
+    path = run.directory / "report.html"
+    write_text(path, page)
+    say(verdict(run, comparison))
+    say(f"report: {path}")
+    return path
+
+
+def _image(folder, name, caption):
+    data = base64.b64encode((Path(folder) / name).read_bytes()).decode()
+    told = escape(caption)
+    return (
+        f'<figure><img alt="{told}"'
+        f' src="data:image/png;base64,{data}"><figcaption>{told}</figcaption></figure>'
+    )
+
+
+def _grid(folder, pictures):
+    return f'<div class="grid">{"".join(_image(folder, *p) for p in pictures)}</div>'
+
+
+def _table(header, rows):
+    """HTML table; a row that is a string becomes a heading inside the table."""
+    lines = "".join(f"<th>{escape(h)}</th>" for h in header)
+    out = f"<tr>{lines}</tr>"
+    for row in rows:
+        if isinstance(row, str):
+            out += f'<tr class="head"><td colspan="{len(header)}">{escape(row)}</td></tr>'
+        else:
+            out += (
+                "<tr>"
+                + "".join(
+                    f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row
+                )
+                + "</tr>"
+            )
+    return f'<div class="table"><table>{out}</table></div>'
+
+
+def _missing(text):
+    return f'<p class="missing">{escape(text)}</p>'
+
+
+def _headline(run, comparison):
+    design, m = run.design, run.design.manipulator
+    c = comparison
+    errors = c.reduced_target or c.solved_target
+    asked = "No target stands beside this design."
+    if run.target is not None:
+        length = f", {errors.reference_length:.1f} mm long" if errors else ""
+        asked = f"A curve of {len(run.target)} points{length} ({design.target or 'target.csv'})."
+    names = ", ".join(segment_name(s) for s in m.segments)
+    designed = (
+        f"{len(m.segments)} segment{'s' * (len(m.segments) > 1)} ({names}), {m.length:.1f} mm long at rest, "
+        f"{m.segments[0].width:g} mm wide, one pressure of {plain(design.pressure * 1e3)} kPa."
+    )
+    out = (
+        f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b>"
+        f" {escape(designed)}</p>"
+    )
+    out += f'<p class="verdict">{escape(verdict(run, comparison))}</p>'
+    out += _alarms(run)
+    out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
+    if c.reduced_solved:
+        out += (
+            f'<p class="missing">"Confirms" means an RMS distance of at most {CONFIRMS:g} % of length, '
+            f'"roughly" at most {ROUGHLY:g} %, beyond that "contradicts".</p>'
+        )
+    return out
+
+
+def _alarms(run):
+    return "".join(f'<p class="alarm">OVERLAP, not proven: {escape(text)}.</p>' for text in overlaps(run))
+
+
+def _shapes(run, comparison, law, folder):
+    out = ""
+    if run.solve is None:
+        out += _missing("There is no finite element solution in this folder yet (pneunet solve).")
+    elif run.solve.solution is None:
+        out += _missing("The finite element fields (solve/solution.pvd) are not in this folder.")
+    curves = figures.curve_picture(run, comparison, folder)
+    bodies = figures.body_pictures(run, comparison, law, folder)
+    fields = [b for b in bodies if b[0] in ("fe_displacement.png", "fe_stretch.png", "reference.png")]
+    beside = [b for b in bodies if b not in fields]
+    return (
+        out
+        + "<p>Same camera and scale for all pictures but the body at rest.</p>"
+        + _grid(folder, beside)
+        + "".join(_image(folder, *c) for c in curves)
+        + _grid(folder, fields)
+    )
+
+
+def _errors(comparison, run):
+    at = f" at {plain(run.solve.pressure * 1e3)} kPa" if run.solve else ""
+    columns = [
+        (f"reduced vs target at {plain(run.design.pressure * 1e3)} kPa", comparison.reduced_target),
+        (f"FE vs target{at}", comparison.solved_target),
+        (f"reduced vs FE{at}", comparison.reduced_solved),
+    ]
+    mark = " (overlaps: not proven)" * bool(overlaps(run))
+    columns = [(name + mark * ("FE" in name), e) for name, e in columns if e is not None]
+    if not columns:
+        return _missing("There are no two curves to compare.")
+
+    def both(e, mm, sign=""):
+        return f"{mm:{sign}.2f} mm ({e.percent(mm):{sign}.2f} %)"
+
+    rows = [
+        ["RMS, points paired by arc length"] + [both(e, e.rms) for _, e in columns],
+        ["two-sided Hausdorff distance"] + [both(e, e.hausdorff) for _, e in columns],
+        ["tip distance"] + [both(e, e.tip) for _, e in columns],
+        ["Eq. 27 (sum of squared nearest distances)"]
+        + [f"{significant(e.eq27)} mm² over {e.eq27_points} points" for _, e in columns],
+        ["length mismatch"] + [both(e, e.length_mismatch, "+") for _, e in columns],
+        ["lengths"] + [f"{e.length:.2f} mm vs {e.reference_length:.2f} mm" for _, e in columns],
+    ]
+    return (
+        _table(["", *[name for name, _ in columns]], rows)
+        + "<p>% of the length of the second curve named.</p>"
+    )
+
+
+def _strains(run, comparison):
+    if run.solve is None:
+        return _missing(
+            "Segment strains are measured on the finite element solution, which is not there yet."
+        )
+    measured, predicted = run.solve.strains, comparison.strains
+    quantities = [
+        ("stretch |e|", lambda s: s.stretch, 1.0, 4),
+        ("twist k1, rad/m of undeformed length", lambda s: s.k[:, 0], 1e3, 2),
+        ("curvature k2 (about the width), 1/m of undeformed length", lambda s: s.k[:, 1], 1e3, 2),
+        ("curvature k3 (about the height), 1/m of undeformed length", lambda s: s.k[:, 2], 1e3, 2),
+        ("Frenet curvature |k x e|/|e|², 1/m", lambda s: s.frenet_curvature, 1e3, 2),
+        ("torsion k.e/|e|² (a twisting segment's tau), rad/m", lambda s: s.frenet_torsion, 1e3, 2),
+    ]
+    rows = []
+    for i, segment in enumerate(run.design.manipulator.segments):
+        rows.append(f"segment {i + 1}: {segment_name(segment)}")
+        for label, of, unit, digits in quantities:
+            fe = of(measured)[i] * unit
+            reduced = None if predicted is None else of(predicted)[i] * unit
+            told = "-" if reduced is None else _fixed(reduced, digits)
+            ratio = "-" if reduced is None or abs(reduced) < 10.0**-digits else f"{fe / reduced:.3f}"
+            rows.append([label, told, _fixed(fe, digits), ratio])
+    return (
+        _alarms(run)
+        + _table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
+        + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not"
+        " depend on that choice.</p>"
+    )
+
+
+def _fixed(value, digits):
+    """Fixed decimals, and no minus before a zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _history(run, law, folder):
+    if run.solve is None:
+        return _missing("No finite element solution yet.")
+    return "".join(_image(folder, *p) for p in figures.history_picture(run, law, folder))
+
+
+def _walls(run, folder):
+    if run.solve is None:
+        return _missing("No wall distances: there is no finite element solution yet.")
+    solve, distances = run.solve, [d for *_, d in run.solve.walls]
+    out, touching = _alarms(run), sum(d < 0 for d in distances)
+    if touching and solve.contact:
+        out += f"<p>Walls touch in {touching} of {len(distances)} gaps, held apart by a contact model.</p>"
+    elif touching:
+        out += f"<p>WALLS OVERLAP in {touching} of {len(distances)} gaps; a real body would be stopped.</p>"
+    elif distances:
+        out += f"<p>No walls touch in the last step: the smallest distance is {min(distances):.2f} mm.</p>"
+    far = solve.steps["body_distance_mm"][-1]
+    if np.isfinite(far):
+        out += (
+            "<p>Coils and segments: the smallest distance between parts that are far apart along the body is"
+            f" {far:.2f} mm. Contact between such parts is not modelled.</p>"
+        )
+    if not distances:
+        return out + _missing("No wall distances: the body has no gaps.")
+    out += "".join(
+        _image(folder, *p) for p in figures.touching_picture(run, folder) + figures.wall_picture(run, folder)
+    )
+    rows = []
+    for key in sorted({(a, b) for a, b, _, _ in run.solve.walls}, key=lambda k: (k[0], -k[1])):
+        here = [(d, gap) for a, b, gap, d in run.solve.walls if (a, b) == key]
+        distance, gap = min(here)
+        rest = run.design.manipulator.segments[key[0] - 1].gap
+        rows.append(
+            [
+                f"{key[0]}, {'upper' if key[1] > 0 else 'lower'}",
+                len(here),
+                plain(rest),
+                f"{distance:.3f}",
+                gap,
+                "open" if distance >= 0 else "in contact" if solve.contact else "OVERLAP",
+            ]
+        )
+    return out + _table(
+        ["segment, side", "gaps", "gap at rest, mm", "smallest distance, mm", "in gap", ""], rows
+    )
+
+
+def _drawing(run, folder):
+    rows = segment_table(run.design.manipulator)
+    table = _table(
+        ["segment", *[str(i + 1) for i in range(len(rows[0][1]))]],
+        [[label, *values] for label, values in rows],
+    )
+    materials = {m.name: m for m in run.design.manipulator.materials}.values()
+    told = _table(
+        ["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],
+        [[m.name, m.law, plain(m.mu, 4), plain(m.density * 1e12), m.source or "-"] for m in materials],
+    )
+    return _image(folder, "drawing.png", "All dimensions in mm.") + table + told
+
+
+def _flat(record, prefix=""):
+    """(key, text) of a nested record; long lists are told by their length."""
+    for key, value in record.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, dict):
+            yield from _flat(value, f"{name}: ")
+        elif isinstance(value, list) and (len(value) > 8 or any(isinstance(v, (dict, list)) for v in value)):
+            yield name, f"{len(value)} entries"
+        elif isinstance(value, float):
+            yield name, f"{value:.6g}"
+        elif isinstance(value, list):
+            yield name, ", ".join(f"{v:.6g}" if isinstance(v, float) else str(v) for v in value)
+        else:
+            yield name, str(value)
+
+
+def _computed(run):
+    out = ""
+    if run.solve is not None:
+        solve, steps = run.solve, run.solve.steps
+        rows = [
+            ["accepted steps", int(steps["step"][-1])],
+            ["Newton iterations", int(steps["iterations"].sum())],
+            ["factorisations", int(steps["factorisations"].sum())],
+            ["seconds in steps", f"{steps['seconds'][-1]:.1f}"],
+            ["last pressure, kPa", plain(run.solve.pressure * 1e3)],
+            ["reached the design pressure", "no" if stopped_short(run) else "yes"],
+            ["walls overlap", "yes" if solve.walls_overlap else "no"],
+            ["far parts of the body overlap", "yes" if solve.body_overlap else "no"],
+        ]
+        out += _table(["finite element solution", ""], rows)
+    records = [
+        ("design (run.json)", run.record),
+        ("mesh (mesh/mesh.json)", run.mesh),
+        ("finite elements (solve/run.json)", run.solve.record if run.solve else {}),
+    ]
+    for title, record in records:
+        out += _table([title, ""], _flat(record)) if record else _missing(f"No record: {title}.")
+    return out

@@ -1,0 +1,1 @@
+"""The search for a design: space, first guess, least squares, whole chambers."""

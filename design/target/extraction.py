@@ -1,0 +1,217 @@
+"""Extraction of twist, curvature, torsion and pitch from the pieces of a target (the paper's Fig. 8).
+
+Every kind of piece is an arc of uniform Frenet curvature and torsion: a straight line has neither, a circle
+no torsion. So one fit serves all: place the arc on the points by the best rigid fit, which has a closed form,
+and search the one or two rates that are left. The placed arc also has frames, bent towards -z as a one-sided
+segment bends, and the twist of a straight piece is the angle about it between the frames before and after.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pneunet.base import se3
+from pneunet.base.frames import best_rigid_fit
+from pneunet.base.strains import RodStrains
+from pneunet.design.target.curves import arc_lengths, frenet, sample
+from pneunet.design.target.target import BENDING, HELICAL, TWISTING
+
+FIT_POINTS = 31
+
+
+@dataclass(frozen=True)
+class Arc:
+    """An arc of uniform curvature (1/mm) and torsion (rad/mm) on points; frames (3, 3) at its ends; rms in
+    mm."""
+
+    length: float
+    curvature: float
+    twist: float
+    start: np.ndarray
+    end: np.ndarray
+    rms: float
+
+
+@dataclass(frozen=True)
+class Extracted:
+    """What one segment is to do, per deformed length: length mm, twist (tau or torsion) rad/mm, curvature
+    1/mm.
+
+    twist_seen: the points (or frames) determine the twist. fit_rms: mm between the points and the piece of
+    uniform rates. note: what had to be assumed.
+    """
+
+    kind: str
+    length: float
+    twist: float
+    curvature: float
+    fit_rms: float
+    twist_seen: bool = True
+    note: str = ""
+
+    @property
+    def strains(self):
+        """RodStrains of the wanted piece as an unstretched rod."""
+        return RodStrains([1.0, 0, 0], [self.twist, self.curvature, 0.0])
+
+    def table(self):
+        """By file key; the paper's and Frenet's numbers by their own names."""
+        out = {"kind": self.kind, "length_mm": self.length}
+        if self.kind == TWISTING:
+            out["tau_rad_per_mm"] = self.twist
+        else:
+            out["curvature_per_m"] = 1e3 * self.curvature
+        if self.kind == HELICAL:
+            out["torsion_rad_per_m"] = 1e3 * self.twist
+            out["cylinder_curvature_per_m"] = 1e3 * float(self.strains.helix_cylinder_curvature)
+            out["pitch_mm"] = float(self.strains.helix_pitch)
+        out["fit_rms_mm"] = self.fit_rms
+        if self.note:
+            out["note"] = self.note
+        return out
+
+
+def _screw(curvature, twist):
+    return np.array([twist, curvature, 0.0, 1.0, 0.0, 0.0])
+
+
+def _arc_points(s, curvature, twist):
+    return se3.exp_pose(s[:, None] * _screw(curvature, twist))[:, :3, 3]
+
+
+def fit_arc(points, kind, curvature=None, twist=None):
+    """The `Arc` of a kind nearest to points (n, 3), paired by arc length, with given rates kept.
+
+    twisting: curvature 0; bending: torsion 0. The search starts from the median curvature and torsion of the
+    points, and, for a helix, from both hands.
+    """
+    length = arc_lengths(points)[-1]
+    s = np.linspace(0, length, FIT_POINTS)
+    wanted = sample(points, s)
+    weights = np.ones(FIT_POINTS)
+    given_curvature = 0.0 if kind == TWISTING else curvature
+    given_twist = 0.0 if kind in (TWISTING, BENDING) else twist
+
+    def rates(x):
+        x = list(x / length)
+        c = given_curvature if given_curvature is not None else x.pop(0)
+        t = given_twist if given_twist is not None else x.pop(0)
+        return c, t
+
+    def misfit(x):
+        arc = _arc_points(s, *rates(x))
+        return (se3.transform(best_rigid_fit(arc, wanted, weights), arc) - wanted).ravel()
+
+    _, curvatures, torsions = frenet(points, length / 3)
+    starts = [[]]
+    if given_curvature is None:
+        starts = [[length * np.median(curvatures)]]
+    if given_twist is None:
+        guess = np.median(torsions)
+        starts = [
+            start + [length * t] for start in starts for t in ((guess, -guess, 0.0) if guess else (0.0,))
+        ]
+    best = np.array(starts[0])
+    if best.size:
+        fits = [least_squares(misfit, start, xtol=1e-10, ftol=1e-12) for start in starts]
+        best = min(fits, key=lambda fit: fit.cost).x
+    c, t = rates(best)
+    if c < 0:  # a half turn about the tangent makes it the same arc with a positive curvature
+        c = -c
+    arc = _arc_points(s, c, t)
+    pose = best_rigid_fit(arc, wanted, weights)
+    rms = float(np.sqrt(np.mean(np.sum((se3.transform(pose, arc) - wanted) ** 2, axis=1))))
+    end = pose @ se3.exp_pose(length * _screw(c, t))
+    return Arc(float(length), float(c), float(t), pose[:3, :3], end[:3, :3], rms)
+
+
+def turn_about_axis(before, after):
+    """Angle in rad (-pi..pi) about the first axis that turns frame (3, 3) `before` into `after`."""
+    R = before.T @ after
+    return float(np.arctan2(R[2, 1] - R[1, 2], R[1, 1] + R[2, 2]))
+
+
+def extract(target, pieces):
+    """The list of `Extracted` for the pieces of a target; the user's givens are kept where there are any."""
+    ends = np.concatenate([[0.0], np.cumsum([p.length for p in pieces])])
+    own = arc_lengths(target.points)
+    arcs = []
+    for piece, low, high in zip(pieces, ends[:-1], ends[1:]):
+        within = (own > low + 1e-6 * ends[-1]) & (own < high - 1e-6 * ends[-1])
+        stations = np.concatenate([[low], own[within], [high]])
+        arcs.append(fit_arc(sample(target.points, stations), piece.kind, piece.curvature, piece.twist))
+    out = [
+        Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p))
+        for p, arc in zip(pieces, arcs)
+    ]
+    for run in _runs(pieces):
+        for i in run:
+            if target.frames is not None:
+                out[i] = _twist_from_frames(target, pieces[i], arcs[i], ends[i], ends[i + 1])
+        if target.frames is None:
+            for i, extracted in zip(run, _twist_of_run(target, pieces, arcs, run)):
+                out[i] = extracted
+    return out
+
+
+def _kept(piece):
+    return "" if piece.curvature is None and piece.twist is None else "as given"
+
+
+def _runs(pieces):
+    """Indices of neighbouring twisting pieces, as lists."""
+    runs = []
+    for i, piece in enumerate(pieces):
+        if piece.kind == TWISTING:
+            if runs and runs[-1][-1] == i - 1:
+                runs[-1].append(i)
+            else:
+                runs.append([i])
+    return runs
+
+
+def _twist_of_run(target, pieces, arcs, run):
+    """`Extracted` for straight pieces in a row: only their sum shows, as a turn of the bending plane, modulo
+    2 pi."""
+    first, last = run[0], run[-1]
+    before = arcs[first - 1].end if first > 0 else target.base_rotation
+    after = arcs[last + 1].start if last + 1 < len(pieces) else None
+    seen = before is not None and after is not None
+    free = [i for i in run if pieces[i].twist is None]
+    given = sum(pieces[i].twist * pieces[i].length for i in run if pieces[i].twist is not None)
+    turn, note = 0.0, "the points do not show its twist: taken as 0"
+    if seen:
+        shown = turn_about_axis(before, after)
+        turn = (shown - given + np.pi) % (2 * np.pi) - np.pi
+        note = (
+            f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest"
+            " is taken"
+        )
+        if len(free) > 1:
+            note += "; shared evenly among neighbours"
+    free_length = sum(pieces[i].length for i in free)
+    for i in run:
+        piece = pieces[i]
+        visible = seen and len(run) == 1
+        if piece.twist is None:
+            yield Extracted(TWISTING, piece.length, turn / free_length, 0.0, arcs[i].rms, visible, note)
+        else:
+            kept = "as given"
+            if visible:
+                kept += f"; the points show a turn of {np.degrees(shown):.1f} deg modulo 360"
+                kept += f", the given one is {np.degrees(given):.1f} deg"
+            elif not seen:
+                kept += "; the points do not show it"
+            yield Extracted(TWISTING, piece.length, piece.twist, 0.0, arcs[i].rms, visible, kept)
+
+
+def _twist_from_frames(target, piece, arc, low, high):
+    """`Extracted` of a twisting piece from the turns about t1 between neighbouring frames."""
+    own = arc_lengths(target.points)
+    turns = [turn_about_axis(a, b) for a, b in zip(target.frames, target.frames[1:])]
+    angle = np.interp([low, high], own, np.concatenate([[0.0], np.cumsum(turns)]))
+    twist, note = (angle[1] - angle[0]) / piece.length, "twist from the frames"
+    if piece.twist is not None:
+        twist, note = piece.twist, "as given"
+    return Extracted(TWISTING, piece.length, float(twist), 0.0, arc.rms, True, note)

@@ -1,0 +1,316 @@
+"""Reading a `Target` from a CSV of points or a TOML; docs/use-design.md shows the files.
+
+Every bad input is one line that names the key and the fix.
+"""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import read_csv
+from pneunet.base.files.toml import file_key, number, read_toml, refuse_unknown
+from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
+from pneunet.base.strains import helix_frenet
+from pneunet.base.units import MPA_PER_KPA, PER_MM_PER_M
+from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, TWISTING, Piece, Target
+from pneunet.geometry.parameters import Segment
+
+#: targets that come along: octopus.toml, vase.toml, ...
+SHIPPED = Path(__file__).resolve().parents[1] / "data"
+POINT_COLUMNS = ("x_mm", "y_mm", "z_mm")
+FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
+
+#: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
+#: found, and a bottom layer is no variable of the inverse design
+START_KEYS = {
+    file_key(f): f.name
+    for f in fields(Segment)
+    if f.metadata.get("unit") == "mm" and f.name != "layer_thickness"
+}
+SHARED = ("width", "channel_width", "channel_height", "cavity_floor", "end_margin")
+VARY_KEYS = {"angle_deg": "angle"} | {key: name for key, name in START_KEYS.items() if name not in SHARED}
+
+
+def read_target(path):
+    """The Target in a CSV of points or a TOML; InputError otherwise."""
+    path = Path(path)
+    if path.suffix.lower() == ".toml":
+        return _from_toml(path)
+    if path.suffix.lower() == ".csv":
+        points, frames = _read_points(path)
+        return _target(str(path), points=points, frames=frames, name=path.stem)
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    raise InputError(f"{path}: a target is a .csv of points in mm or a .toml")
+
+
+def _target(where, **values):
+    try:
+        return Target(**values)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+# ---- CSV
+
+
+def _is_number(cell):
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _read_points(path):
+    """(points (n, 3), frames (n, 3, 3) or None) of a CSV: named columns, or three bare columns of numbers."""
+    first, rows = read_csv(path)
+    header = [cell.strip().lstrip("\ufeff") for cell in first]
+    if all(_is_number(cell) for cell in header):
+        if len(header) != 3:
+            raise InputError(f"{path}: a CSV without a header has 3 columns x, y, z in mm, not {len(header)}")
+        header, rows, skipped = list(POINT_COLUMNS), [first, *rows], 0
+    else:
+        skipped = 1
+        refuse_unknown(dict.fromkeys(header), [*POINT_COLUMNS, *FRAME_COLUMNS], f"{path} header")
+    values = _numbers(path, header, rows, skipped)
+    missing = [c for c in POINT_COLUMNS if c not in values]
+    if missing:
+        raise InputError(f"{path}: column '{missing[0]}' is missing")
+    points = np.column_stack([values[c] for c in POINT_COLUMNS])
+    return points, _frames_of(values, path) if "t1x" in values or "t2x" in values else None
+
+
+def _numbers(path, header, rows, skipped):
+    table = np.empty((len(rows), len(header)))
+    for i, row in enumerate(rows):
+        if len(row) != len(header):
+            raise InputError(f"{path} row {i + 1 + skipped}: {len(row)} columns instead of {len(header)}")
+        for j, cell in enumerate(row):
+            if not _is_number(cell) or not np.isfinite(float(cell)):
+                raise InputError(
+                    f"{path} row {i + 1 + skipped}: '{header[j]}' must be a finite number, not"
+                    f" '{cell.strip()}'"
+                )
+            table[i, j] = float(cell)
+    return dict(zip(header, table.T))
+
+
+def _frames_of(values, where):
+    missing = [c for c in FRAME_COLUMNS if c not in values]
+    if missing:
+        raise InputError(f"{where}: column '{missing[0]}' is missing: frames need {', '.join(FRAME_COLUMNS)}")
+    t1 = np.column_stack([values[c] for c in FRAME_COLUMNS[:3]])
+    t2 = np.column_stack([values[c] for c in FRAME_COLUMNS[3:]])
+    return np.stack([t1, t2, np.cross(t1, t2)], axis=2)
+
+
+# ---- TOML
+
+POINT_KEYS = ("target", "points", "points_mm", "frames")
+KEYS = (
+    "name",
+    *POINT_KEYS,
+    "pressure_kPa",
+    "pressure_range_kPa",
+    "piece",
+    "base",
+    "material",
+    "segment",
+    "vary",
+)
+
+
+def _from_toml(path):
+    table = read_toml(path)
+    refuse_unknown(table, KEYS, str(path))
+    folder = path.parent
+    if "target" in table:
+        table, folder = _on_shipped(table, path)
+    where = str(path)
+    points, frames = _toml_points(table, folder, where)
+    direction, width = _base(table.get("base", {}), f"{where} [base]")
+    material = table.get("material")
+    return _target(
+        where,
+        points=points,
+        frames=frames,
+        name=str(table.get("name", path.stem)),
+        pieces=_pieces(table.get("piece", []), where),
+        base_direction=direction,
+        base_width=width,
+        pressure_range=_pressure_range(table, where),
+        material=PAPER_TWISTING if material is None else material_from_table(material, f"{where} [material]"),
+        start=_start(table.get("segment", {}), f"{where} [segment]"),
+        vary=_vary(table["vary"], f"{where} [vary]") if "vary" in table else None,
+    )
+
+
+def _on_shipped(table, path):
+    """The tables of the shipped target that `target` names, with the user's own in their place where
+    given."""
+    names = sorted(p.stem for p in SHIPPED.glob("*.toml"))
+    if table["target"] not in names:
+        known = ", ".join(names) or "none in this installation: give points instead"
+        raise InputError(f"{path}: target = '{table['target']}' is not shipped: shipped are {known}")
+    if "points" in table or "points_mm" in table:
+        raise InputError(f"{path}: 'target' and 'points' exclude each other: give one")
+    shipped = read_toml(SHIPPED / f"{table['target']}.toml")
+    own = {key: value for key, value in table.items() if key != "target"}
+    if "pressure_kPa" in own or "pressure_range_kPa" in own:
+        shipped = {key: value for key, value in shipped.items() if not key.startswith("pressure")}
+    return shipped | own, SHIPPED
+
+
+def _toml_points(table, folder, where):
+    if ("points" in table) == ("points_mm" in table):
+        raise InputError(
+            f"{where}: give one of 'points' (a CSV file), 'points_mm' (a list of [x, y, z]) or 'target'"
+        )
+    if "points" in table:
+        if not isinstance(table["points"], str):
+            raise InputError(f"{where}: 'points' names a CSV file; write a list as 'points_mm'")
+        points, frames = _read_points(folder / table["points"])
+    else:
+        points, frames = _array(table["points_mm"], "points_mm", where, 2), None
+    if "frames" in table:
+        frames = np.swapaxes(_array(table["frames"], "frames", where, 3), 1, 2)
+    return points, frames
+
+
+def _array(value, key, where, dimensions):
+    try:
+        array = np.array(value)
+        numeric = array.dtype.kind in "if" and array.ndim == dimensions
+    except ValueError:
+        numeric = False
+    if not numeric:
+        shape = "[x, y, z]" if dimensions == 2 else "[t1, t2, t3] of three numbers each"
+        raise InputError(f"{where}: '{key}' must be a list of {shape}")
+    return array.astype(float)
+
+
+def _pressure_range(table, where):
+    if "pressure_kPa" in table and "pressure_range_kPa" in table:
+        raise InputError(
+            f"{where}: 'pressure_kPa' (fixed) and 'pressure_range_kPa' exclude each other: give one"
+        )
+    if "pressure_kPa" in table:
+        low = high = number(table["pressure_kPa"], "pressure_kPa", where)
+        key = "pressure_kPa"
+    elif "pressure_range_kPa" in table:
+        key = "pressure_range_kPa"
+        low, high = _range(table[key], key, where)
+    else:
+        return None
+    if not 0 < low <= high <= 1e3 * PRESSURE_LIMIT:
+        raise InputError(
+            f"{where}: {key} = {table[key]} must lie in 0..{1e3 * PRESSURE_LIMIT:g} kPa (above it the"
+            " chambers leak)"
+        )
+    return low * MPA_PER_KPA, high * MPA_PER_KPA
+
+
+def _range(value, key, where):
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f"{where}: '{key}' must be [smallest, largest], not {value!r}")
+    low, high = (number(v, key, where) for v in value)
+    if low > high:
+        raise InputError(f"{where}: '{key}' = {value}: the smallest comes first")
+    return low, high
+
+
+PIECE_KEYS = {
+    TWISTING: ("kind", "length_mm", "tau_rad_per_mm"),
+    BENDING: ("kind", "length_mm", "curvature_per_m"),
+    HELICAL: (
+        "kind",
+        "length_mm",
+        "cylinder_curvature_per_m",
+        "pitch_mm",
+        "curvature_per_m",
+        "torsion_rad_per_m",
+    ),
+}
+
+
+def _pieces(rows, where):
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise InputError(f"{where}: pieces are written [[piece]], with double brackets")
+    return tuple(_piece(row, f"{where} [[piece]] {i}") for i, row in enumerate(rows, start=1))
+
+
+def _piece(row, where):
+    kind = row.get("kind")
+    if kind not in PIECE_KEYS:
+        raise InputError(f"{where}: kind = {kind!r} is not known: write 'twisting', 'bending' or 'helical'")
+    refuse_unknown(row, PIECE_KEYS[kind], where)
+    if "length_mm" not in row:
+        raise InputError(f"{where}: key 'length_mm' is missing (deformed length)")
+    value = {key: number(v, key, where) for key, v in row.items() if key != "kind"}
+    if value["length_mm"] <= 0:
+        raise InputError(f"{where}: length_mm = {value['length_mm']:g} must be larger than 0")
+    twist, curvature = value.get("tau_rad_per_mm"), value.get("curvature_per_m")
+    curvature = None if curvature is None else curvature * PER_MM_PER_M
+    if kind == HELICAL:
+        curvature, twist = _helix(value, curvature, where)
+    if curvature is not None and curvature <= 0:
+        raise InputError(
+            f"{where}: a curvature must be larger than 0 (its direction follows from the points)"
+        )
+    return Piece(kind, float(value["length_mm"]), twist, curvature)
+
+
+def _helix(value, curvature, where):
+    """Frenet curvature and torsion from either pair of givens, (None, None) without."""
+    cylinder, frenet = ("cylinder_curvature_per_m", "pitch_mm"), ("curvature_per_m", "torsion_rad_per_m")
+    given = [key for key in cylinder + frenet if key in value]
+    if not given:
+        return None, None
+    if set(given) == set(cylinder):
+        if value[cylinder[0]] <= 0:
+            raise InputError(
+                f"{where}: cylinder_curvature_per_m = {value[cylinder[0]]:g} must be larger than 0"
+            )
+        return helix_frenet(value[cylinder[0]] * PER_MM_PER_M, value["pitch_mm"])
+    if set(given) == set(frenet):
+        return curvature, value["torsion_rad_per_m"] * PER_MM_PER_M
+    raise InputError(
+        f"{where}: a helix is given by {' and '.join(cylinder)}, or by {' and '.join(frenet)} (Frenet), or"
+        " not at all"
+    )
+
+
+def _base(table, where):
+    """(direction, width) unit vectors or None."""
+    refuse_unknown(table, ("direction", "width_direction"), where)
+    out = []
+    for key in ("direction", "width_direction"):
+        if key not in table:
+            out.append(None)
+            continue
+        vector = _array([table[key]], key, where, 2)[0]
+        if vector.shape != (3,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0:
+            raise InputError(f"{where}: '{key}' must be three numbers, not all 0")
+        out.append(vector / np.linalg.norm(vector))
+    direction, width = out
+    if width is None:
+        return direction, None
+    if direction is None:
+        raise InputError(f"{where}: 'width_direction' needs 'direction' too")
+    if abs(direction @ width) > 1e-3:
+        raise InputError(f"{where}: 'width_direction' must be perpendicular to 'direction'")
+    width = width - (width @ direction) * direction
+    return direction, width / np.linalg.norm(width)
+
+
+def _start(table, where):
+    refuse_unknown(table, START_KEYS, where)
+    return {START_KEYS[key]: float(number(value, key, where)) for key, value in table.items()}
+
+
+def _vary(table, where):
+    refuse_unknown(table, VARY_KEYS, where)
+    return {VARY_KEYS[key]: _range(value, key, where) for key, value in table.items()}

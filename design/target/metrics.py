@@ -1,0 +1,103 @@
+"""How far apart two centrelines are, four ways, with the mismatch of their lengths beside them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneunet.design.target.curves import arc_lengths, evenly, nearest_points
+
+PAIRS = 201
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Distances of a curve from a reference curve: mm, and mm^2 for `eq27`.
+
+    rms: root mean square distance of points paired at equal fractions of each curve's own arc length. eq27:
+    the paper's Eq. 27, the *sum* over the reference's points of the squared distance to the curve (the paper
+        calls it a mean squared error; a curve that is too long does not raise it).
+    hausdorff: largest distance from either curve to the other.  tip: distance of the last points.
+    """
+
+    rms: float
+    eq27: float
+    eq27_points: int
+    hausdorff: float
+    tip: float
+    length: float
+    reference_length: float
+
+    @property
+    def length_mismatch(self):
+        """Length of the curve minus that of the reference, mm."""
+        return self.length - self.reference_length
+
+    def percent(self, distance):
+        """A distance in mm as % of the reference's length."""
+        return 100 * distance / self.reference_length
+
+    def table(self):
+        """Everything by file key."""
+        return {
+            "rms_mm": self.rms,
+            "rms_percent_of_length": self.percent(self.rms),
+            "eq27_sum_mm2": self.eq27,
+            "eq27_points": self.eq27_points,
+            "hausdorff_mm": self.hausdorff,
+            "hausdorff_percent_of_length": self.percent(self.hausdorff),
+            "tip_mm": self.tip,
+            "tip_percent_of_length": self.percent(self.tip),
+            "length_mm": self.length,
+            "reference_length_mm": self.reference_length,
+            "length_mismatch_mm": self.length_mismatch,
+            "length_mismatch_percent": self.percent(self.length_mismatch),
+        }
+
+    def lines(self):
+        """The same for people, a line each."""
+        return [
+            f"RMS, paired by arc length  {self.rms:8.3f} mm   ({self.percent(self.rms):.2f} % of length)",
+            f"Eq. 27, sum over {self.eq27_points:4d} points {self.eq27:8.3f} mm^2",
+            f"Hausdorff, two-sided       {self.hausdorff:8.3f} mm   ({self.percent(self.hausdorff):.2f} %)",
+            f"tip                        {self.tip:8.3f} mm   ({self.percent(self.tip):.2f} %)",
+            (
+                f"length {self.length:.2f} mm, wanted {self.reference_length:.2f} mm:"
+                f" {self.length_mismatch:+.2f} mm ({self.percent(self.length_mismatch):+.2f} %)"
+            ),
+        ]
+
+
+def paired_rms(a, b, pairs=PAIRS):
+    """RMS distance in mm of polylines a (n, 3) and b (m, 3) paired at equal fractions of their own arc
+    lengths."""
+    return float(np.sqrt(np.mean(np.sum((evenly(a, pairs) - evenly(b, pairs)) ** 2, axis=1))))
+
+
+def eq27(points, curve):
+    """The paper's Eq. 27 in mm^2: sum of squared distances from points (n, 3) to a polyline (m, 3)."""
+    return float(np.sum((points - nearest_points(points, curve)) ** 2))
+
+
+def hausdorff(a, b):
+    """Two-sided Hausdorff distance in mm of polylines, from the vertices of each to the segments of the
+    other."""
+    one_way = [np.linalg.norm(p - nearest_points(p, q), axis=1).max() for p, q in ((a, b), (b, a))]
+    return float(max(one_way))
+
+
+def compare(curve, reference):
+    """`Errors` of a polyline (m, 3) against a reference polyline (n, 3), both in mm and in the same
+    coordinates.
+
+    The reference is the target, or the finite element solution when a reduced prediction is judged.
+    """
+    curve, reference = np.asarray(curve, float), np.asarray(reference, float)
+    return Errors(
+        rms=paired_rms(curve, reference),
+        eq27=eq27(reference, curve),
+        eq27_points=len(reference),
+        hausdorff=hausdorff(curve, reference),
+        tip=float(np.linalg.norm(curve[-1] - reference[-1])),
+        length=float(arc_lengths(curve)[-1]),
+        reference_length=float(arc_lengths(reference)[-1]),
+    )

@@ -1,0 +1,124 @@
+"""`Target`: what the user wants. Points in space, and what the user says about them beyond that."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import PAPER_TWISTING, NeoHookean
+from pneunet.design.target.curves import arc_lengths
+
+TWISTING, BENDING, HELICAL = "twisting", "bending", "helical"
+LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
+PRESSURE_LIMIT = 0.060  # MPa; beyond it silicone pneu-nets leak (Jiang et al. 2021, Sec. IV D)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of the target that one segment is to follow; lengths and rates per *deformed* length.
+
+    length in mm; twist in rad/mm: the twist tau of a twisting piece, the torsion of a helical one; curvature
+    in 1/mm (Frenet's). None = to be extracted from the points.
+    """
+
+    kind: str
+    length: float
+    twist: float | None = None
+    curvature: float | None = None
+
+
+@dataclass(frozen=True)
+class Target:
+    """points (n, 3) in mm from base to tip, and optionally
+
+    frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); pieces: the
+    split; base_direction, base_width (3,): unit vectors that fix the base (width None = its roll stays free);
+    pressure_range (low, high) in MPa, equal = fixed; material; start: {field of Segment: mm}; vary: {field of
+    Segment: (low, high)} or None for the default choice.
+    """
+
+    points: np.ndarray
+    name: str = "target"
+    frames: np.ndarray | None = None
+    pieces: tuple = ()
+    base_direction: np.ndarray | None = None
+    base_width: np.ndarray | None = None
+    pressure_range: tuple | None = None
+    material: NeoHookean = PAPER_TWISTING
+    start: dict = field(default_factory=dict)
+    vary: dict | None = None
+
+    def __post_init__(self):
+        points = np.asarray(self.points, float)
+        object.__setattr__(self, "points", points)
+        check_points(points)
+        if self.frames is not None:
+            object.__setattr__(self, "frames", _checked_frames(np.asarray(self.frames, float), points))
+        if self.pieces:
+            object.__setattr__(self, "pieces", _fitted_to(self.pieces, self.length))
+
+    @property
+    def length(self):
+        """Arc length of the points' polyline, mm."""
+        return float(arc_lengths(self.points)[-1])
+
+    @property
+    def base_rotation(self):
+        """Rotation (3, 3) of a base that is fixed altogether, else None."""
+        if self.base_width is None:
+            return None
+        return np.column_stack(
+            [self.base_direction, self.base_width, np.cross(self.base_direction, self.base_width)]
+        )
+
+
+def check_points(points):
+    """InputError unless points are (n >= 4, 3), finite, without repeats and of a length that can be built."""
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"points must be rows of x, y, z in mm, not an array of shape {points.shape}")
+    if len(points) < 4:
+        raise InputError(f"{len(points)} points: a target needs at least 4")
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise InputError(f"point {bad[0] + 1} is not finite: every coordinate must be a number")
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = steps.sum()
+    repeated = np.flatnonzero(steps <= 1e-9 * length)
+    if len(repeated):
+        raise InputError(f"points {repeated[0] + 1} and {repeated[0] + 2} are the same: remove one")
+    if not 10 <= length <= 2000:
+        raise InputError(
+            f"the curve is {length:.4g} mm long, outside 10..2000 mm: are its coordinates in mm?"
+        )
+
+
+def _checked_frames(frames, points):
+    if frames.shape != (len(points), 3, 3):
+        raise InputError(f"frames have shape {frames.shape}: {len(points)} points need ({len(points)}, 3, 3)")
+    if not np.isfinite(frames).all():
+        raise InputError("frames: every component must be a finite number")
+    wrong = abs(np.swapaxes(frames, 1, 2) @ frames - np.eye(3)).max(axis=(1, 2)) > 1e-3
+    wrong |= np.linalg.det(frames) < 0
+    if wrong.any():
+        raise InputError(
+            f"frame {np.argmax(wrong) + 1} is not a right-handed set of orthogonal unit vectors t1, t2, t3"
+        )
+    chords = np.diff(points, axis=0)
+    if (
+        np.sum(chords * (frames[:-1, :, 0] + frames[1:, :, 0]) / 2)
+        < 0.5 * np.linalg.norm(chords, axis=1).sum()
+    ):
+        raise InputError("frames: t1 does not point along the curve, from base to tip")
+    return frames
+
+
+def _fitted_to(pieces, length):
+    """The pieces with lengths scaled to add up to the curve's; more than a rounding apart is the user's
+    mistake."""
+    total = sum(p.length for p in pieces)
+    if abs(total - length) > LENGTH_TOLERANCE * length:
+        raise InputError(
+            f"[[piece]] length_mm: the pieces add up to {total:.4g} mm but the curve is {length:.4g} mm long"
+            " (lengths are deformed ones)"
+        )
+    return tuple(Piece(p.kind, p.length * length / total, p.twist, p.curvature) for p in pieces)

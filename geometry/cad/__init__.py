@@ -1,0 +1,1 @@
+"""Solids and tetrahedral meshes of manipulators and cells, by gmsh."""

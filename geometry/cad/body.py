@@ -1,0 +1,215 @@
+"""Parametric CAD of a manipulator in gmsh's OpenCASCADE kernel.
+
+Recipe: parallelogram prisms from plan polygons; the outer solids of each segment fused; all cavities fused
+with the channel; everything fragmented, so that the boundary of the cavity volumes is the exact cavity
+surface. The cavities are then removed and the faces tagged.
+"""
+
+from contextlib import contextmanager
+
+import gmsh
+import numpy as np
+
+from pneunet.base.errors import InputError
+
+#: physical tags of the faces; volumes are tagged BODY + segment index, bottom layers LAYER + segment index
+CAVITY, CHANNEL, BASE, TIP, OUTER = 11, 12, 13, 14, 15
+BODY, LAYER = 100, 300
+FACE_NAMES = {CAVITY: "cavity", CHANNEL: "channel", BASE: "base", TIP: "tip", OUTER: "outer"}
+
+_TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
+
+
+@contextmanager
+def session(name="pneunet"):
+    """A gmsh session with one empty model; quiet, and closed whatever happens."""
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.add(name)
+        yield gmsh.model
+    finally:
+        gmsh.finalize()
+
+
+def prism(corners, z0, z1):
+    """Volume tag of a prism over the plan polygon `corners` (n, 2) between heights z0 and z1 (mm)."""
+    occ = gmsh.model.occ
+    points = [occ.addPoint(x, y, z0) for x, y in corners]
+    lines = [occ.addLine(a, b) for a, b in zip(points, points[1:] + points[:1])]
+    face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
+    return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, z1 - z0) if dim == 3)
+
+
+def slanted_plan(x, thickness, half_width, segment, side):
+    """Plan corners (4, 2) of a chamber centred at x: `thickness` normal, between y = -half_width and
+    +half_width."""
+    half = thickness / segment.sin / 2
+    slant = segment.cot * half_width * side
+    return np.array(
+        [
+            [x - slant - half, -half_width],
+            [x - slant + half, -half_width],
+            [x + slant + half, half_width],
+            [x + slant - half, half_width],
+        ]
+    )
+
+
+def box(x0, x1, half_width, z0, z1):
+    return gmsh.model.occ.addBox(x0, -half_width, z0, x1 - x0, 2 * half_width, z1 - z0)
+
+
+def chamber_block(segment, x, side, thickness, half_width, z0, z1):
+    low, high = sorted((side * z0, side * z1))
+    return prism(slanted_plan(x, thickness, half_width, segment, side), low, high)
+
+
+def fuse(tags, unify):
+    gmsh.option.setNumber("Geometry.OCCUnionUnify", int(unify))
+    if len(tags) == 1:
+        return [(3, tags[0])]
+    return gmsh.model.occ.fuse([(3, tags[0])], [(3, t) for t in tags[1:]])[0]
+
+
+def outer_solids(segment, start):
+    """Volume tags of one segment's core and chamber blocks, not yet fused; x begins at `start` (mm)."""
+    s = segment
+    tags = [box(start, start + s.length, s.width / 2, s.core_bottom, s.core_top)]
+    for x in start + s.chamber_positions:
+        for side in s.sides:
+            # from the channel axis upwards: well inside the core, so that only the sides are coplanar
+            tags.append(chamber_block(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top))
+    return tags
+
+
+def cavity_solids(segment, start, channel_from, channel_to):
+    """Volume tags of one segment's chamber cavities and its stretch of channel (clipped to the given x
+    range)."""
+    s = segment
+    tags = []
+    x0, x1 = max(start, channel_from), min(start + s.length, channel_to)
+    if x1 > x0:
+        tags.append(box(x0, x1, s.channel_width / 2, -s.channel_height / 2, s.channel_height / 2))
+    for x in start + s.chamber_positions:
+        for side in s.sides:
+            tags.append(
+                chamber_block(
+                    s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top
+                )
+            )
+    return tags
+
+
+def layer_solid(segment, start, stop):
+    """[volume tag] of the bottom layer between two x (mm); empty when the segment has none."""
+    return (
+        [box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)]
+        if segment.layer_thickness
+        else []
+    )
+
+
+def pieces(children):
+    """Volumes among the children that OpenCASCADE's fragment reports of some of its arguments."""
+    return {v for family in children for v in family if v[0] == 3}
+
+
+def channel_range(manipulator):
+    """x (mm) at which the channel begins and ends: half a pitch beyond the first and the last chamber, so
+    that every chamber has its whole cell; what remains of the passive ends closes it."""
+    first, last = manipulator.segments[0], manipulator.segments[-1]
+    return (
+        first.chamber_positions[0] - first.pitch / 2,
+        manipulator.starts[-1] + last.chamber_positions[-1] + last.pitch / 2,
+    )
+
+
+def build(manipulator):
+    """Build the manipulator in the current gmsh model: one body volume per segment (two with a bottom layer),
+    tagged faces, one closed cavity.
+
+    Returns the CAD volumes {"body_mm3", "cavity_mm3"}. Raises InputError when the cavity is not one piece or
+    a segment falls apart.
+    """
+    occ = gmsh.model.occ
+    start_stop = channel_range(manipulator)
+    bodies, cavities, layers = [], [], []
+    for segment, start in zip(manipulator.segments, manipulator.starts):
+        bodies += fuse(outer_solids(segment, start), unify=True)
+        cavities += [tag for tag in cavity_solids(segment, start, *start_stop)]
+        layers += [(3, tag) for tag in layer_solid(segment, start, start + segment.length)]
+    # seams are kept: they separate the channel's wall from the chambers'
+    cavities = fuse(cavities, unify=False)
+    _, parents = occ.fragment(bodies, cavities + layers)
+    occ.synchronize()
+    inner = len(bodies) + len(cavities)
+    cavity_volumes, layer_volumes = (
+        sorted(pieces(parents[len(bodies) : inner])),
+        sorted(pieces(parents[inner:])),
+    )
+    body_volumes = sorted(pieces(parents[: len(bodies)]) - set(cavity_volumes))
+    volumes = {
+        "body_mm3": sum(occ.getMass(*v) for v in body_volumes),
+        "cavity_mm3": sum(occ.getMass(*v) for v in cavity_volumes),
+    }
+    if len(body_volumes) != len(manipulator.segments) + len(layers):
+        raise InputError(
+            f"segment: the body falls into {len(body_volumes)} pieces instead of"
+            f" {len(manipulator.segments) + len(layers)}: a wall is cut through by a cavity; check the wall"
+            " and roof thicknesses"
+        )
+    cavity_faces = {abs(t) for _, t in gmsh.model.getBoundary(cavity_volumes, combined=True, oriented=True)}
+    body_faces = {abs(t) for _, t in gmsh.model.getBoundary(body_volumes, combined=True, oriented=True)}
+    if not cavity_faces <= body_faces:
+        raise InputError(
+            "segment: the cavity breaks through the outer surface: check side_wall, top_wall and"
+            " base_thickness"
+        )
+    _tag_volumes(BODY, "segment", range(len(manipulator.segments)), set(body_volumes) - set(layer_volumes))
+    _tag_volumes(
+        LAYER,
+        "layer of segment",
+        [i for i, s in enumerate(manipulator.segments) if s.layer_thickness],
+        layer_volumes,
+    )
+    _tag_faces(manipulator, body_faces, cavity_faces)
+    occ.remove(cavity_volumes)
+    occ.synchronize()
+    return volumes
+
+
+def in_channel(segment, box):
+    """Whether a cavity face with this bounding box (6 numbers) is a piece of the channel's wall (its ends are
+    not)."""
+    x0, y0, z0, x1, y1, z1 = box
+    in_y = max(abs(y0), abs(y1)) < segment.channel_width / 2 + _TOLERANCE
+    in_z = max(abs(z0), abs(z1)) < segment.channel_height / 2 + _TOLERANCE
+    return in_y and in_z and x1 - x0 > 10 * _TOLERANCE
+
+
+def _tag_volumes(first, name, segments, volumes):
+    """Tag first + i for each segment index i; the volumes are told apart by their order along x."""
+    order = sorted(volumes, key=lambda v: gmsh.model.occ.getCenterOfMass(*v)[0])
+    for i, (_, tag) in zip(segments, order):
+        gmsh.model.addPhysicalGroup(3, [tag], first + i)
+        gmsh.model.setPhysicalName(3, first + i, f"{name} {i + 1}")
+
+
+def _tag_faces(manipulator, body_faces, cavity_faces):
+    groups = {tag: [] for tag in FACE_NAMES}
+    for face in sorted(body_faces):
+        x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(2, face)
+        if face in cavity_faces:
+            i = int(np.clip(np.searchsorted(manipulator.starts, (x0 + x1) / 2) - 1, 0, None))
+            s = manipulator.segments[i]
+            groups[CHANNEL if in_channel(s, (x0, y0, z0, x1, y1, z1)) else CAVITY].append(face)
+        elif x1 < _TOLERANCE:
+            groups[BASE].append(face)
+        elif x0 > manipulator.length - _TOLERANCE:
+            groups[TIP].append(face)
+        else:
+            groups[OUTER].append(face)
+    for tag, faces in groups.items():
+        gmsh.model.addPhysicalGroup(2, faces, tag)
+        gmsh.model.setPhysicalName(2, tag, FACE_NAMES[tag])

@@ -1,0 +1,1 @@
+"""A whole body: the mixed problem, the manipulator, its tip."""

@@ -1,0 +1,174 @@
+"""A MixedProblem as a system for Newton's method: section-frame updates and a tangent that turns with the
+body."""
+
+import numpy as np
+from mpi4py import MPI
+
+from pneunet.hifi.fem.solver import DirectSolver
+from pneunet.hifi.path.low_rank import ContactUpdate
+
+#: changes of touch above which a tangent is factorised anew
+MOST_TOUCHES = 60
+
+
+class BodySystem:
+    """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each
+    linear in it."""
+
+    def __init__(self, problem, coordinates, apply_load):
+        self.problem, self.coordinates, self.apply_load = problem, coordinates, apply_load
+        self.comm = problem.mesh.comm
+        self._matrix = problem.create_tangent()
+        self.solver = DirectSolver(self._matrix, self.comm, problem.symmetric)
+        self._spread = problem.state.copy()
+        self._load = 0.0
+        apply_load(0.0)
+        self._nodes = problem.displacement_space.dofmap.index_map.size_global
+        self._owned_displacements = problem.displacement_dofs[: problem.owned_nodes]
+
+    # ---- state and load
+    @property
+    def state(self):
+        return self.problem.array
+
+    @state.setter
+    def state(self, array):
+        self.problem.set_array(array)
+
+    @property
+    def load(self):
+        return self._load
+
+    @load.setter
+    def load(self, value):
+        self._load = value
+        self.apply_load(value)
+
+    def steer(self, apply_load, load):
+        """From here on the load is what `apply_load` sets, and begins at `load`; what was set before
+        stays."""
+        self.apply_load, self.load = apply_load, load
+
+    def at_supports(self, state):
+        """`state` with supported displacements at their values for the present load."""
+        return self.problem.supported(state, self._load)
+
+    # ---- residual and tangent
+    def residual(self):
+        return self.problem.residual()
+
+    def load_gradient(self):
+        """(owned dofs,) derivative of the residual by the load, which it is linear in; zero at supports."""
+        load, ends = self._load, []
+        for value in (0.0, 1.0):
+            self.apply_load(value)
+            ends.append(self.problem.external_force())
+        self.apply_load(load)
+        return self.problem.unsupported(ends[1] - ends[0])
+
+    def factorise(self):
+        self.problem.assemble_tangent(self._matrix)
+        self.solver.factorise()
+        self._rotation_then = self._rotations()
+        contact = self.problem.contact
+        self._update = ContactUpdate(
+            contact.stiffnesses(factorised=True) if contact else {}, MOST_TOUCHES, self.comm.allreduce
+        )
+
+    @property
+    def overreach(self):
+        return self.problem.contact.overreach if self.problem.contact else 0.0
+
+    def renew(self):
+        """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
+        contact = self.problem.contact
+        return (
+            self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns)
+            if contact
+            else False
+        )
+
+    def _solve_columns(self, right):
+        return np.column_stack([self._solve(column) for column in right.T])
+
+    def _rotations(self):
+        return self.coordinates.sections(self.coordinates.nodes + self.problem.displacement())[:, :3, :3]
+
+    def solve(self, right):
+        """(owned dofs,) approximation of K^-1 right at the current state, K as it was renewed."""
+        return self._update.corrected(self._solve(right))
+
+    def _solve(self, right):
+        """(owned dofs,) approximation of K^-1 right with the factorised tangent.
+
+        The factorised tangent is turned with the body: a rigidly rotated part has the tangent R K R^T, so a
+        lagged one serves as long as the *strains* have not changed much, whatever the sections' rotations.
+        """
+        dofs = self._owned_displacements
+        turn = np.einsum("nij,nkj->nik", self._rotations(), self._rotation_then)[: len(dofs)]
+        turned = right.copy()
+        turned[dofs] = np.einsum("nji,nj->ni", turn, right[dofs])
+        solution = self.solver.solve(turned)
+        solution[dofs] = np.einsum("nij,nj->ni", turn, solution[dofs])
+        return solution
+
+    @property
+    def unstable(self):
+        """Directions in which the factorised state is unstable at fixed loads; None when the matrix is
+        unsymmetric."""
+        if not self.factorisations:
+            return 0  # at rest
+        negative = self.solver.negative_pivots
+        return None if negative is None else negative - self.problem.constraints
+
+    @property
+    def factorisations(self):
+        return self.solver.factorisations
+
+    # ---- geometry of the state space
+    def moved(self, state, increment):
+        """State after an increment (owned dofs,): displacement retracted, pressure added, supported values
+        kept."""
+        self._spread.x.array[: len(increment)] = increment
+        self._spread.x.scatter_forward()
+        full = self._spread.x.array
+        dofs, nodes = self.problem.displacement_dofs, self.coordinates.nodes
+        moved = state + full
+        moved[dofs] = self.coordinates.retract(nodes + state[dofs], full[dofs]) - nodes
+        fixed = self.problem.fixed_dofs
+        moved[fixed] = state[fixed]
+        return moved
+
+    def extrapolated(self, states, weights):
+        """Lagrange extrapolation of states in section frames."""
+        predicted = sum(w * a for w, a in zip(weights, states))
+        dofs, X = self.problem.displacement_dofs, self.coordinates.nodes
+        predicted[dofs] = self.coordinates.extrapolate([X + a[dofs] for a in states], weights) - X
+        return predicted
+
+    def dot(self, a, b):
+        return self.comm.allreduce(float(a @ b), op=MPI.SUM)
+
+    def volume(self):
+        return self.problem.cavity_volume()
+
+    # ---- the metric of arc length: root mean square displacement of the nodes
+    def positions(self):
+        return self.problem.array[self._owned_displacements].ravel()
+
+    def positions_part(self, increment):
+        return increment[self._owned_displacements].ravel()
+
+    def mean_square(self, a, b):
+        return self.dot(a, b) / self._nodes
+
+    def mean_square_row(self, a):
+        """(owned dofs,) gradient of mean_square(a, positions)."""
+        row = np.zeros(self.problem.owned)
+        row[self._owned_displacements.ravel()] = a / self._nodes
+        return self.problem.unsupported(row)
+
+    def destroy(self):
+        self.solver.destroy()
+        self._matrix.destroy()
+        self.problem.destroy()

@@ -1,0 +1,1 @@
+"""The unit cell of a long segment under screw periodicity."""

@@ -1,0 +1,277 @@
+"""The unit cell as a system for Newton's method, and what an equilibrium of it says about the rod."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pneunet.base.strains import RodStrains
+from pneunet.hifi.fem.solver import DirectSolver
+from pneunet.hifi.path.low_rank import ContactUpdate
+
+#: of the gap: an overlap at which contact has failed
+TOO_DEEP = 0.05
+#: of mu pitch^2, the size of the forces in a cell
+RELATIVE_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class CellState:
+    """One equilibrium, per undeformed length: strains (e, k); force (N) and moment (N mm) in the section
+    frame.
+
+    stiffness (6, 6): d(force, moment)/d(e, k) in N, N mm and N mm2; volume: air in one pitch, mm3; pressure
+    in MPa; unstable: directions in which the cell is unstable at this pressure (its free strains included).
+    wall_distance: smallest signed distance (mm) of neighbouring chambers' walls, `gap` that at rest;
+    walls_overlap: it is negative and there was no contact model, or one that has failed to hold them apart.
+    contact: hifi.contact.walls.WallContact of the gap with the largest force, None without contact. array: the mixed
+    state of the problem (hifi.cell.problem), what pictures and checks are made of. steps, factorisations in them and
+    seconds: what it took to come here from rest (hifi.cell.run).
+    """
+
+    pressure: float
+    strains: RodStrains
+    force: np.ndarray
+    moment: np.ndarray
+    stiffness: np.ndarray
+    volume: float
+    unstable: int
+    largest_stretch: float
+    wall_distance: float
+    gap: float = np.inf
+    contact: object = None
+    array: np.ndarray | None = field(default=None, repr=False)
+    steps: int = 0
+    factorisations: int = 0
+    seconds: float = 0.0
+
+    @property
+    def screw_compliance(self):
+        """(2, 2) of 1/N and 1/(N mm2): how k.k/2 and k.e of a free state change under the wrench m = a k + b
+        e, n = b k.
+
+        This wrench is in equilibrium along a screw by itself, so that the gauge carries nothing, and k.k and
+        k.e are the same for every line and every gauge: so is this part of the compliance. The rest of
+        `stiffness` belongs to the section frame.
+        """
+        e, k = self.strains.e, self.strains.k
+        wrenches = np.array([np.concatenate([0 * k, k]), np.concatenate([k, e])])
+        return wrenches @ np.linalg.solve(self.stiffness, wrenches.T)
+
+    @property
+    def walls_overlap(self):
+        return self.wall_distance < (0.0 if self.contact is None else -TOO_DEEP * self.gap)
+
+    @property
+    def kirchhoff_stiffness(self):
+        """(4, 4) stiffness in (e1, k1, k2, k3) when the shears e2 and e3 relax."""
+        kept, relaxed = [0, 3, 4, 5], [1, 2]
+        K = self.stiffness
+        return K[np.ix_(kept, kept)] - K[np.ix_(kept, relaxed)] @ np.linalg.solve(
+            K[np.ix_(relaxed, relaxed)], K[np.ix_(relaxed, kept)]
+        )
+
+
+class CellSystem:
+    """State: unknowns of the cell, six gauge multipliers, six strains. Increments hold the strains that are
+    free.
+
+    held (6,) bool: which of (e, k) are prescribed. The load ramps: at `load` the pressure is pressure[0] +
+    load * pressure[1] (MPa) and the held strains are strains[0] + load * strains[1]. By default the load is
+    the pressure and all strains are free. Strains enter increments and residuals times the pitch, which makes
+    their entries forces and lengths.
+    """
+
+    def __init__(self, problem, held=None, pressure=(0.0, 1.0), strains=None):
+        self.problem, self.pitch = problem, problem.segment.pitch
+        self.held = np.zeros(6, bool) if held is None else np.asarray(held, bool)
+        self._free = np.flatnonzero(~self.held)
+        self._pressure = pressure
+        self._strains = (
+            [np.eye(6)[0], np.zeros(6)] if strains is None else [np.asarray(s, float) for s in strains]
+        )
+        n = problem.unknowns
+        self._x = np.concatenate([np.zeros(n + 6), self._strains[0]])
+        self._solver = self._matrix = self._pattern = None
+        self._factorisations = 0
+        self.walls = problem.walls
+        self.load = 0.0
+        self.state = self.at_supports(self._x)
+
+    # ---- state and load
+    @property
+    def state(self):
+        return self._x
+
+    @state.setter
+    def state(self, x):
+        self._x = x
+        n = self.problem.unknowns
+        self.problem.state.x.array[:] = self.problem.expand(x[:n])
+        self.problem.strains.value[:] = x[n + 6 :]
+
+    @property
+    def load(self):
+        return self._load
+
+    @load.setter
+    def load(self, value):
+        self._load = value
+        self.problem.pressure.value = self._pressure[0] + value * self._pressure[1]
+
+    def at_supports(self, state):
+        """`state` with the held strains at their values for the present load."""
+        state = state.copy()
+        state[-6:][self.held] = (self._strains[0] + self._load * self._strains[1])[self.held]
+        return state
+
+    # ---- residual and tangent
+    def _parts(self):
+        """(residual of the unknowns and the gauge, residual of all six strains) at the current state."""
+        n = self.problem.unknowns
+        forces, slope = self.problem.residual()
+        gauge, gauge_strains = self.problem.gauge, self.problem.gauge_strains
+        multipliers, strains = self._x[n : n + 6], self._x[n + 6 :]
+        r = np.concatenate([forces + gauge @ multipliers, gauge.T @ self._x[:n] + gauge_strains @ strains])
+        return r, slope + gauge_strains.T @ multipliers
+
+    def residual(self):
+        r, slope = self._parts()
+        return np.concatenate(
+            [r, slope[self._free] / self.pitch]
+        ), self.problem.segment.material.mu * self.pitch**2
+
+    def load_gradient(self):
+        """Derivative of the residual by the load; through held strains with the factorised tangent's
+        coupling."""
+        kept, ends = self.problem.pressure.value.copy(), []
+        for value in (0.0, 1.0):
+            self.problem.pressure.value = value
+            ends.append(self.residual()[0])
+        self.problem.pressure.value = kept
+        gradient = self._pressure[1] * (ends[1] - ends[0])
+        if self.held.any():
+            rate = np.where(self.held, self._strains[1], 0.0)
+            gradient += np.concatenate(
+                [self._mixed @ rate, (self._curvature @ rate)[self._free] / self.pitch]
+            )
+        return gradient
+
+    def factorise(self):
+        """Factorise the tangent. influence (unknowns + 6, 6): how unknowns and multipliers resist strains,
+        K^-1 d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
+        on."""
+        matrix, mixed, self._curvature = self.problem.tangent()
+        if self._pattern is not matrix.indices:
+            self._release()
+            self._pattern = matrix.indices
+            self._matrix = PETSc.Mat().createAIJ(
+                matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
+            )
+            self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+            self._solver = DirectSolver(self._matrix, MPI.COMM_SELF)
+        else:
+            self._matrix.setValuesCSR(matrix.indptr, matrix.indices, matrix.data)
+            self._matrix.assemble()
+        self._solver.factorise()
+        self._factorisations += 1
+        self._mixed = np.vstack([mixed, self.problem.gauge_strains])
+        self.influence = self._solver.solve_many(self._mixed)
+        self.condensed = self._curvature - self._mixed.T @ self.influence
+        self._update = ContactUpdate(
+            self.problem.contact.stiffnesses(factorised=True) if self.problem.contact else {}
+        )
+
+    def renew(self):
+        """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
+        return (
+            self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve)
+            if self.problem.contact
+            else False
+        )
+
+    def _gap_gradients(self, points):
+        rows, n = self.problem.contact.gradients(points), self.problem.unknowns
+        return np.hstack([rows[:, :n], np.zeros((len(rows), 6)), rows[:, n:][:, self._free] / self.pitch])
+
+    def solve(self, right):
+        """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was
+        renewed."""
+        return self._update.corrected(self._solve(right[:, None])[:, 0])
+
+    def solve_inner(self, right):
+        """Inverse of the factorised tangent at held strains times right (unknowns + 6, columns)."""
+        return self._solver.solve_many(right)
+
+    def _solve(self, right):
+        """K^-1 right (., columns) with the factorised tangent: bordering."""
+        free, n = self._free, self.problem.unknowns + 6
+        z = self.solve_inner(right[:n])
+        if not len(free):
+            return z
+        C = self.condensed[np.ix_(free, free)]
+        q = np.linalg.solve(C, right[n:] * self.pitch - self._mixed[:, free].T @ z)
+        return np.vstack([z - self.influence[:, free] @ q, q * self.pitch])
+
+    @property
+    def unstable(self):
+        """Unstable directions of the factorised state: each multiplier takes one negative pivot, strains
+        count apart."""
+        free = self.condensed[np.ix_(self._free, self._free)]
+        inner = self._solver.negative_pivots - self.problem.constraints - 6
+        return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))
+
+    @property
+    def overreach(self):
+        return self.problem.contact.overreach if self.problem.contact else 0.0
+
+    @property
+    def factorisations(self):
+        return self._factorisations
+
+    def moved(self, state, increment):
+        moved = state.copy()
+        n = len(state) - 6
+        moved[:n] += increment[:n]
+        moved[n + self._free] += increment[n:] / self.pitch
+        return moved
+
+    def extrapolated(self, states, weights):
+        return sum(w * x for w, x in zip(weights, states))
+
+    def dot(self, a, b):
+        return float(a @ b)
+
+    def volume(self):
+        """Volume (mm3) of the air in one pitch."""
+        return self.problem.air_volume()
+
+    # ---- what the rod needs
+    def measure(self):
+        """CellState of the present equilibrium; factorises its tangent."""
+        self.factorise()
+        _, slope = self._parts()
+        q = self._x[-6:]
+        return CellState(
+            float(self.problem.pressure.value),
+            RodStrains(q[:3].copy(), q[3:].copy()),
+            slope[:3] / self.pitch,
+            slope[3:] / self.pitch,
+            self.condensed / self.pitch,
+            self.problem.air_volume(),
+            self.unstable,
+            self.problem.stretch.largest(),
+            self.walls.distance(),
+            self.problem.segment.gap if self.walls.gaps else np.inf,
+            self.problem.measure_contact(),
+            self.problem.state.x.array.copy(),
+        )
+
+    def _release(self):
+        if self._solver is not None:
+            self._solver.destroy()
+            self._matrix.destroy()
+
+    def destroy(self):
+        self._release()

@@ -1,0 +1,90 @@
+"""Picture of a deformed cell, repeated by its screw: where do neighbouring chambers touch?"""
+
+import numpy as np
+
+from pneunet.base import se3
+from pneunet.geometry.cad import body as cad
+from pneunet.hifi.contact.walls import CellWalls, distances_from
+from pneunet.hifi.fem import surface
+
+PITCHES = 3
+DIVISIONS = 3
+KPA = 1e3
+
+
+def draw_cell(problem, state, path, pitches=PITCHES):
+    """Write the picture of a hifi.cell.system.CellState of a hifi.cell.problem.CellProblem to `path` (PNG); False
+    without gaps.
+
+    The problem's own state is as before. Needs pyvista and matplotlib.
+    """
+    from pneunet.base.pictures.rendering import edges
+    from pneunet.base.pictures.walls import FIELD, TOUCHING, draw_walls
+
+    kept = problem.strains.value.copy()
+    problem.strains.value[:] = np.concatenate([state.strains.e, state.strains.k])
+    try:
+        distances = node_distances(CellWalls(problem), state.array)
+    finally:
+        problem.strains.value[:] = kept
+    facets = surface.facet_nodes(problem, cad.OUTER)
+    of_facets = distances[facets]
+    facing = np.isfinite(of_facets).all(axis=1)
+    if not facing.any():
+        return False
+    turns = problem.segment.pitch * (np.arange(pitches) - (pitches - 1) / 2)
+    rest, moved = (
+        np.concatenate(x) for x in zip(*(_positions(problem, state, facets, turn) for turn in turns))
+    )
+    body = _mesh(rest)
+    body.point_data["moved"] = _fine(moved)
+    # facets share their points, so that only real edges are edges
+    body = body.clean(tolerance=1e-6, absolute=True)
+    lines, _ = edges(body)
+    for mesh in (body, lines):
+        mesh.points = mesh.point_data["moved"]
+    walls = _mesh(moved[np.tile(facing, pitches)])
+    walls.point_data[FIELD] = np.tile(_fine(of_facets[facing][..., None])[:, 0], pitches)
+    gap, contact = problem.segment.gap, state.contact is not None
+    told = (
+        f"walls overlap by {-state.wall_distance:.2f} mm"
+        if state.walls_overlap
+        else f"walls {state.wall_distance:.3f} mm apart"
+    )
+    title = f"{state.pressure * KPA:.4g} kPa, {'' if contact else 'no '}contact: {told}"
+    draw_walls(path, body, lines, walls, gap, title, TOUCHING * gap if contact else 0.0)
+    return True
+
+
+def node_distances(walls, array):
+    """(nodes,) signed distances (mm) from the wall opposite, of the displacement nodes on the walls of a
+    CellWalls; nan elsewhere."""
+    out = np.full(len(walls.problem.nodes), np.nan)
+    for pair in walls.gaps:
+        placed = [walls.positions(wall, array) for wall in pair]
+        for (facets, _), own, other in zip(pair, placed, placed[::-1]):
+            np.fmin.at(out, facets.ravel(), distances_from(other, own.reshape(-1, 3)))
+    return out
+
+
+def _positions(problem, state, facets, shift):
+    """(rest, deformed) positions (facets, 6, 3) in mm of the facets of the pitch that lies `shift` mm further
+    along the body."""
+    X = problem.nodes[facets] + [shift, 0, 0]
+    screw = se3.exp_pose(np.concatenate([state.strains.k, state.strains.e]) * X[..., :1])
+    local = X * [0, 1, 1] + problem.displacement(state.array)[facets]
+    return X, np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
+
+
+def _fine(values):
+    """(points, m) of (facets, 6, m): at the corners of the flat triangles that a facet is drawn as."""
+    return np.einsum("tcn,fnm->ftcm", surface.subdivision(DIVISIONS), values).reshape(-1, values.shape[-1])
+
+
+def _mesh(facets):
+    """pyvista.PolyData of flat triangles, three points each."""
+    import pyvista
+
+    points = _fine(facets)
+    triangles = np.arange(len(points)).reshape(-1, 3)
+    return pyvista.PolyData(points, np.column_stack([np.full(len(triangles), 3), triangles]).ravel())

@@ -1,0 +1,229 @@
+"""Distance between the walls that face each other across the gaps of a segment, or of the unit cell, where
+one wall of a gap is the screw-periodic image of the other chamber's.
+
+Signed, between the deformed surfaces: negative = overlap, a point of one wall lies behind the other wall's
+surface.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pneunet.base import se3
+from pneunet.geometry.cad import body as cad
+from pneunet.hifi.fem import surface
+
+_TOLERANCE = 1e-6
+_NEIGHBOURS = 8
+#: flat triangles along a facet's edge; the sagitta of a wall's curvature between them is microns
+_DIVISIONS = 4
+
+
+#: walls are in contact where they push at each other with more than this part of the air's pressure
+IN_CONTACT = 0.1
+
+
+@dataclass(frozen=True)
+class WallContact:
+    """force: resultant (N) on a wall; area: undeformed, in contact (mm2); nearest, farthest: distances (mm)
+    met there.
+
+    gamma: stiffness of the medium that transmits it, over the body's; nan without one.
+    """
+
+    force: float = 0.0
+    area: float = 0.0
+    nearest: float = np.nan
+    farthest: float = np.nan
+    gamma: float = np.nan
+
+
+class WallDistances:
+    """Smallest distance in each gap of a manipulator; evaluated on rank 0 from gathered wall nodes."""
+
+    def __init__(self, problem, manipulator):
+        self.problem, self.comm = problem, problem.mesh.comm
+        facets = surface.facet_nodes(problem, cad.OUTER)
+        corners = problem.nodes[facets[:, :3]]
+        self.facets, wall_of_facet, self.gaps = [], [], []
+        wall = 0
+        for i, (segment, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
+            half = segment.chamber_thickness / segment.sin / 2
+            centres = start + segment.chamber_positions
+            for side in segment.sides:
+                along = corners[:, :, 0] - side * segment.cot * corners[:, :, 1]
+                above = (side * corners[:, :, 2]).min(axis=1) > segment.core_top - _TOLERANCE
+                for gap, (x0, x1) in enumerate(zip(centres[:-1] + half, centres[1:] - half), start=1):
+                    for x in (x0, x1):
+                        chosen = np.flatnonzero(above & (np.abs(along - x) < _TOLERANCE).all(axis=1))
+                        self.facets.append(facets[chosen])
+                        wall_of_facet += [wall] * len(chosen)
+                        wall += 1
+                    self.gaps.append((i + 1, "top" if side > 0 else "bottom", gap, segment.gap))
+        self.facets = np.concatenate(self.facets) if self.facets else np.zeros((0, 6), int)
+        #: (facets,) of this rank: walls 2 g and 2 g + 1 face each other across gap g
+        self.wall_of_facet = np.array(wall_of_facet, int)
+        gathered = self.comm.gather(self.wall_of_facet, root=0)
+        self._wall = np.concatenate(gathered) if self.comm.rank == 0 else None
+        self.reference = self._gather(problem.nodes)
+
+    def _gather(self, positions):
+        """(facets of all ranks, 6, 3) on rank 0, None elsewhere."""
+        parts = self.comm.gather(positions[self.facets], root=0)
+        return np.concatenate(parts) if self.comm.rank == 0 else None
+
+    def distances(self, array=None):
+        """(gaps,) signed smallest distances in mm, on rank 0 (None elsewhere); inf where a gap has no
+        walls."""
+        each = self.at_nodes(array)
+        if each is None:
+            return None
+        out = np.full(2 * len(self.gaps), np.inf)
+        np.fmin.at(out, self._wall, each.min(axis=1, initial=np.inf))
+        return out.reshape(-1, 2).min(axis=1)
+
+    def at_nodes(self, array=None):
+        """(facets of all walls, 6) signed distances (mm) of their nodes from the wall that they face, on rank
+        0 (None elsewhere)."""
+        positions = self._gather(self.problem.nodes + self.problem.displacement(array))
+        if self.comm.rank != 0:
+            return None
+        out = np.full(positions.shape[:2], np.inf)
+        order = np.argsort(self._wall, kind="stable")
+        walls = np.split(order, np.searchsorted(self._wall[order], np.arange(1, 2 * len(self.gaps))))
+        for wall in range(2 * len(self.gaps)):
+            a, b = walls[wall], walls[wall ^ 1]
+            if len(a) and len(b):
+                points, inverse = np.unique(positions[a].reshape(-1, 3), axis=0, return_inverse=True)
+                out[a] = distances_from(positions[b], points)[inverse.ravel()].reshape(-1, 6)
+        return out
+
+    def node_numbers(self, numbers):
+        """(facets of all walls, 6) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes`
+        has them."""
+        return self._gather(numbers)
+
+
+class CellWalls:
+    """The walls of a cell's gaps, put together from the pieces that its cuts leave.
+
+    gaps: a pair of walls for each side of the body, the second facing the first across the gap; each is
+    (facets (n, 6) of nodes, shift (n,) in mm, whole pitches that bring a piece to its wall).
+    """
+
+    def __init__(self, problem):
+        self.problem, s = problem, problem.segment
+        facets = surface.facet_nodes(problem, cad.OUTER)
+        corners = problem.nodes[facets[:, :3]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        slope = normal[:, 0] / np.linalg.norm(normal, axis=1)
+        self.gaps = []
+        for side in s.sides:
+            above = (side * corners[:, :, 2]).min(axis=1) > s.core_top - _TOLERANCE
+            along = (corners[:, :, 0] - side * s.cot * corners[:, :, 1]).mean(axis=1)
+            first, second = (np.flatnonzero(above & (sign * slope > 0.1)) for sign in (1, -1))
+            plane = along[first[0]]
+            places = ((first, plane), (second, plane + s.gap / s.sin))
+            self.gaps.append([(facets[c], s.pitch * np.round((x - along[c]) / s.pitch)) for c, x in places])
+
+    def positions(self, wall, array=None):
+        """(n, 6, 3) deformed positions of a wall's nodes, in the section frame at X1 = 0."""
+        facets, shift = wall
+        e, k = np.split(self.problem.strains.value, 2)
+        u, X = self.problem.displacement(array), self.problem.nodes[facets]
+        screw = se3.exp_pose(np.concatenate([k, e]) * (X[..., :1] + shift[:, None, None]))
+        local = X * [0, 1, 1] + u[facets]
+        return np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
+
+    def distance(self):
+        """Smallest signed distance in mm; inf without chambers."""
+        pairs = [[self.positions(wall) for wall in gap] for gap in self.gaps]
+        return min((min(wall_distance(a, b), wall_distance(b, a)) for a, b in pairs), default=np.inf)
+
+    def contact(self, pressure):
+        """WallContact of the gap with the largest force, `pressure` (MPa) being that of the air."""
+        return max((self._contact(gap, pressure) for gap in self.gaps), key=lambda c: c.force)
+
+    def _contact(self, gap, pressure):
+        (facets, shift), other = gap
+        e, k = np.split(self.problem.strains.value, 2)
+        s = self.problem.nodes[facets][..., :1] + shift[:, None, None]
+        rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
+        forces = np.einsum("...ij,...j->...i", rotation, self.problem.contact_forces()[facets]).reshape(-1, 3)
+        # a node of a cut lies on both sides of it, with a share of the force on each
+        _, first, inverse = np.unique(
+            np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True
+        )
+        forces, x = forces[first], self.positions(gap[0]).reshape(-1, 3)[first]
+        shares = np.outer(surface.reference_areas(self.problem, facets), [0, 0, 0, 1 / 3, 1 / 3, 1 / 3])
+        areas = np.bincount(inverse.ravel(), shares.ravel())
+        total = np.linalg.norm(forces.sum(axis=0))
+        touching = (areas > 0) & (
+            forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas
+        )
+        distances = distances_from(self.positions(other), x)[touching]
+        nearest, farthest = (distances.min(), distances.max()) if len(distances) else (np.nan, np.nan)
+        return WallContact(
+            float(total),
+            float(areas[touching].sum()),
+            float(nearest),
+            float(farthest),
+            self.problem.medium.gamma,
+        )
+
+
+def wall_distance(points, wall):
+    """Smallest signed distance (mm) of the nodes of quadratic facets `points` (n, 6, 3) from the wall (m, 6,
+    3)."""
+    return float(distances_from(wall, np.unique(points.reshape(-1, 3), axis=0)).min())
+
+
+def distances_from(wall, points):
+    """(n,) signed distances (mm) of points (n, 3) from a wall of quadratic facets (m, 6, 3)."""
+    triangles = surface.subdivided(wall, _DIVISIONS)
+    count = min(_NEIGHBOURS, len(triangles))
+    near = cKDTree(triangles.mean(axis=1)).query(points, k=count)[1].reshape(len(points), count)
+    candidates = triangles[near]
+    closest = closest_point(points[:, None], candidates)
+    offset = points[:, None] - closest
+    distance = np.linalg.norm(offset, axis=-1)
+    best = distance.argmin(axis=1)
+    rows = np.arange(len(points))
+    distance, offset, triangle = distance[rows, best], offset[rows, best], candidates[rows, best]
+    normal = np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    # behind the wall only when the wall's interior is what is closest; past its rim the sign has no meaning
+    behind = np.einsum("ni,ni->n", offset, normal) < -0.9 * distance
+    return np.where(behind, -distance, distance)
+
+
+def closest_point(point, triangle):
+    """Points (..., 3) of triangles (..., 3, 3) closest to points (..., 3); Ericson, Real-Time Collision
+    Detection, 5.1.5."""
+    a, b, c = triangle[..., 0, :], triangle[..., 1, :], triangle[..., 2, :]
+    ab, ac = b - a, c - a
+    d1, d2 = _dot(ab, point - a), _dot(ac, point - a)
+    d3, d4 = _dot(ab, point - b), _dot(ac, point - b)
+    d5, d6 = _dot(ab, point - c), _dot(ac, point - c)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = va + vb + vc
+        v, w = vb / total, vc / total
+        on_ab, on_ac = d1 / (d1 - d3), d2 / (d2 - d6)
+        on_bc = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+    regions = [
+        ((d1 <= 0) & (d2 <= 0), 0.0, 0.0),
+        ((d3 >= 0) & (d4 <= d3), 1.0, 0.0),
+        ((vc <= 0) & (d1 >= 0) & (d3 <= 0), on_ab, 0.0),
+        ((d6 >= 0) & (d5 <= d6), 0.0, 1.0),
+        ((vb <= 0) & (d2 >= 0) & (d6 <= 0), 0.0, on_ac),
+        ((va <= 0) & (d4 >= d3) & (d5 >= d6), 1 - on_bc, on_bc),
+    ]
+    v = np.select([r[0] for r in regions], [np.broadcast_to(r[1], v.shape) for r in regions], v)
+    w = np.select([r[0] for r in regions], [np.broadcast_to(r[2], w.shape) for r in regions], w)
+    return a + v[..., None] * ab + w[..., None] * ac
+
+
+def _dot(a, b):
+    return np.einsum("...i,...i->...", a, b)

@@ -1,0 +1,1 @@
+"""What dolfinx needs: function spaces, materials, loads, surfaces, and measures of a deformed body."""

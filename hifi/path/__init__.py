@@ -1,0 +1,1 @@
+"""Equilibrium paths of any system: Newton's method, controls, steps, limit points."""

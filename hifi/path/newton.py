@@ -1,0 +1,194 @@
+"""Newton's method with a lagged tangent and secant acceleration, for any system and any control.
+
+A *system* (hifi.body.system, hifi.cell.system) has a state (an array), a scalar `load` (pressure, a fraction of
+gravity, ...), and
+    residual() -> ((n,) array, scale)     what must vanish, and the norm of the forces it balances
+    load_gradient() -> (n,)               d residual / d load
+    factorise(), solve((n,)) -> (n,)      the tangent at the current state; K^-1 times an array, K possibly an
+                                          older one
+    moved(state, increment), dot(a, b)    retraction and inner product (over all ranks)
+    volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state
+                                          (None: unknown)
+    renew(), overreach                    of walls that touch: brings the tangent up to date with what touches
+                                          now (hifi.path.low_rank);
+                                          how deep they overlap at the last residual, over what a correction
+                                          may make of it
+A *control* (hifi.path.control) closes the equations for the load. Between factorisations, steps are corrected by
+the secants seen so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear
+Algebra Appl. 16, 2009): the residual that the past increments explain is removed before the lagged tangent
+sees the rest. One solve and one residual an iteration. On slender bodies a lagged tangent is no help once
+walls have bulged, however small the step. What it makes worse is taken back, which costs a solve, and the
+tangent is factorised where the correction started: steps can be many times longer. Where walls touch, each
+change of what touches renews the tangent (an active-set iteration), and corrections that drive walls far into
+each other, unseen by a tangent that knew of no contact there, are shortened.
+"""
+
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+
+from pneunet.hifi.fem.solver import NotConverged
+
+#: how often a correction is shortened at most
+SHORTENINGS = 4
+#: what a new tangent, and an updated one, must make of the residual where walls touch for the tangent to be
+#: updated further
+TANGENT_GAIN, UPDATE_GAIN = 0.2, 0.5
+#: tangents factorised for one step, after which it should have come closer where walls touch
+MOST_IN_CONTACT = 6
+
+
+@dataclass
+class NewtonOptions:
+    """relative_tolerance: of the norm of the forces balanced (absolute_tolerance in N, for no load at all).
+
+    patience: a new tangent is factorised when the lagged one would need more than this many iterations to
+    finish, at the rate of the last two. A factorisation costs 10 to 20 iterations at 30k to 150k dofs, and
+    secants make the rate better than it looks at first. secants: how many are kept.
+    """
+
+    relative_tolerance: float = 1e-8
+    absolute_tolerance: float = 1e-11
+    patience: float = 12.0
+    maximum_iterations: int = 60
+    growth_limit: float = 1e4
+    secants: int = 8
+
+
+@dataclass
+class NewtonResult:
+    iterations: int
+    residuals: list = field(default_factory=list)
+
+
+class Newton:
+    """Iterates a system to equilibrium at a value of its control's parameter."""
+
+    def __init__(self, system, control, options=None):
+        self.system, self.control = system, control
+        self.options = options or NewtonOptions()
+        self.current = False  # whether there is a factorisation to lag
+        self.factorised_at = None  # (state, load) of that factorisation
+        self.timings = {"residual": 0.0, "factorise": 0.0, "renew": 0.0, "solve": 0.0}
+
+    def timed(self, name, function, *arguments):
+        start = perf_counter()
+        try:
+            return function(*arguments)
+        finally:
+            self.timings[name] += perf_counter() - start
+
+    def factorise(self):
+        self.timed("factorise", self.system.factorise)
+        self.current, self.factorised_at = True, (self.system.state.copy(), self.system.load)
+
+    def residual(self):
+        """(residual, its norm, norm of the forces it balances)."""
+        r, scale = self.timed("residual", self.system.residual)
+        return r, np.sqrt(self.system.dot(r, r)), scale
+
+    def solve(self, parameter):
+        """Iterate from the current state to equilibrium at the control's `parameter`; NotConverged
+        otherwise."""
+        o, system, control = self.options, self.system, self.control
+        r, norm, scale = self.residual()
+        history, secants = [norm], Secants(system, o.secants)
+        # residuals that the lagged tangent has left; whether it is of the present state
+        since, fresh = [norm], False
+        factorised, due = 0, False  # tangents so far; whether walls that touch ask for the next
+        for iteration in range(o.maximum_iterations + 1):
+            tolerance = o.relative_tolerance * scale + o.absolute_tolerance
+            if norm <= tolerance and control.satisfied(system, parameter):
+                return NewtonResult(iteration, history)
+            renewed = self.current and not due and self.timed("renew", system.renew)
+            if not self.current or due or renewed is None or iterations_left(since, tolerance) > o.patience:
+                self.factorise()
+                renewed, fresh = True, True
+                factorised += 1
+                if factorised > MOST_IN_CONTACT and system.overreach > 0 and norm > 0.1 * history[0]:
+                    raise NotConverged(
+                        f"residual {norm:.1e} N after {factorised} tangents: what touches does not settle"
+                    )
+            if renewed:
+                secants.forget()
+                since = []
+            state, load = system.state.copy(), system.load
+            step, load_step = self.timed("solve", self._correction, r, parameter, secants)
+            system.state = system.moved(state, step)
+            system.load += load_step
+            before = system.overreach
+            new, new_norm, new_scale = self.residual()
+            deepest = max(1.0, before)
+            for _ in range(SHORTENINGS):
+                if system.overreach <= deepest and np.isfinite(new_norm):
+                    break
+                fraction = (deepest - before) / (system.overreach - before) if np.isfinite(new_norm) else 0.3
+                fraction = min(max(fraction, 0.1), 0.7)
+                step, load_step = fraction * step, fraction * load_step
+                system.state, system.load = system.moved(state, step), load + load_step
+                new, new_norm, new_scale = self.residual()
+            history.append(new_norm)
+            if not fresh and not new_norm < norm:
+                # worse by a lagged tangent: take the correction back and factorise where it started
+                system.state, system.load, self.current = state, load, False
+                continue
+            # what touches changes by much: iterate on it with new tangents until they reduce the residual
+            due = (
+                system.overreach > 0
+                and bool(renewed)
+                and not new_norm < (TANGENT_GAIN if fresh else UPDATE_GAIN) * norm
+            )
+            secants.add(step, load_step, new - r)
+            r, norm, scale, fresh = new, new_norm, new_scale, False
+            since.append(norm)
+            if not np.isfinite(norm) or norm > o.growth_limit * max(history[0], scale):
+                raise NotConverged(f"residual grew to {norm:.1e} N")
+        raise NotConverged(
+            f"residual {norm:.1e} N after {o.maximum_iterations} iterations (tolerance {tolerance:.1e} N)"
+        )
+
+    def _correction(self, r, parameter, secants):
+        """(increment, load increment) of one iteration."""
+        rest, known, known_load = secants.explain(r)
+        z = self.system.solve(rest)
+        step, load_step = -z - known, -known_load
+        return self.control.close(self.system, parameter, step, load_step)
+
+
+class Secants:
+    """Pairs of increments and residual changes since the last factorisation."""
+
+    def __init__(self, system, most):
+        self.system, self.most = system, most
+        self.forget()
+
+    def forget(self):
+        self._steps, self._loads, self._changes = [], [], []
+
+    def add(self, step, load_step, change):
+        for rows, row in ((self._steps, step), (self._loads, load_step), (self._changes, change)):
+            rows.append(row)
+            del rows[: max(0, len(rows) - self.most)]
+
+    def explain(self, r):
+        """(the rest of r, increment, load increment) that past changes explain in the least-squares sense."""
+        if not self._changes:
+            return r, 0.0, 0.0
+        gram = np.array([[self.system.dot(a, b) for b in self._changes] for a in self._changes])
+        right = np.array([self.system.dot(a, r) for a in self._changes])
+        weights = np.linalg.lstsq(gram, right, rcond=1e-12)[0]
+        return (
+            r - sum(w * c for w, c in zip(weights, self._changes)),
+            sum(w * s for w, s in zip(weights, self._steps)),
+            sum(w * q for w, q in zip(weights, self._loads)),
+        )
+
+
+def iterations_left(history, tolerance):
+    """Iterations to `tolerance` at the mean rate of the last two corrections; 0 when there is no rate yet."""
+    if len(history) < 2:
+        return 0.0
+    back = min(2, len(history) - 1)
+    rate = (history[-1] / history[-1 - back]) ** (1 / back)
+    return np.inf if rate >= 1 else np.log(tolerance / history[-1]) / np.log(rate)

@@ -1,0 +1,1 @@
+"""Runs that write files: cases in processes of their own, solve, study, campaign."""

@@ -1,0 +1,1 @@
+"""`pneunet campaign`: the data set that the rod law is trained on."""

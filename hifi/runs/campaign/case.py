@@ -1,0 +1,247 @@
+"""One case of a campaign: a cell over its range of pressures, free, then at prescribed strains around some of
+its free states.
+
+The range is found first: by the cavity's volume the path is walked until the pressure asked for or a limit
+point of it. The states at the levels are then corrected from interpolations of that path, at fractions of the
+top pressure; beyond a share of the limit load nothing is recorded. Walls that touch are held apart.
+Everything is in mm and MPa with mu = 1 MPa.
+"""
+
+import json
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from pneunet.base.errors import ConvergenceError
+from pneunet.base.files.atomic import write_text
+from pneunet.base.materials.laws import material_from_table
+from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.designfile import segment_from_table
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.shape_slopes import ShapeSlopes
+from pneunet.hifi.cell.stored_energy import StoredEnergy
+from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.contact.penalty import WallPenalty
+from pneunet.hifi.contact.touch import Load, TouchWatch
+from pneunet.hifi.fem.solver import NotConverged
+from pneunet.hifi.path.control import LoadControl, VolumeControl
+from pneunet.hifi.path.equilibrium import EquilibriumPath, PathState
+from pneunet.hifi.path.newton import NewtonOptions
+from pneunet.hifi.path.stepping import StepSize, run_steps
+
+STATES = "states.json"
+#: the path is only a guide for what is computed on it
+SCOUT_TOLERANCE = 1e-5
+#: of the volume at rest: first and largest step of the scout, and how far it goes
+FIRST, LARGEST, FURTHEST = 0.03, 0.5, 30.0
+#: a prescribed state is walked to in steps of at most this part of the way
+HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.1
+#: free states whose stiffness is differentiated by the shape, where the strains are: every n-th
+STIFFNESS_SLOPES_EVERY = 4
+REST = np.eye(6)[0]
+
+
+class _Enough(Exception):
+    """The scout has seen the pressures it was sent for."""
+
+
+def solve_campaign_case(inputs, directory):
+    """Case of hifi.runs.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share",
+    "prescribed", "slopes": whether free states are differentiated by the shape}.
+
+    directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where
+    there was none), top pressure, first touch of walls, why prescribed states are missing, CPU time.
+    ConvergenceError when the free path ends before its top pressure.
+    """
+    segment = segment_from_table(
+        inputs["segment"], "segment", material_from_table(inputs["material"], "material")
+    )
+    path = directory / "cell.msh"
+    mesh = mesh_cell(
+        segment, path=path, **{key.removesuffix("_mm"): value for key, value in inputs["mesh"].items()}
+    )
+    sampler = Sampler(CellProblem(segment, path, contact=WallPenalty()), directory, inputs["slopes"])
+    path.unlink()
+    mesh["unknowns"] = sampler.problem.unknowns
+    top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
+    levels = top * np.arange(inputs["levels"] + 1) / inputs["levels"]
+    sampler.free(levels)
+    missing = sampler.prescribed(inputs["prescribed"])
+    return {
+        "mesh": mesh,
+        "limit_pressure": limit,
+        "top_pressure": top,
+        "first_touch": first_touch(sampler.states),
+        "missing": missing,
+        "cpu_seconds": time.process_time(),
+    }
+
+
+class Sampler:
+    """The states of one cell."""
+
+    def __init__(self, problem, directory, slopes=False):
+        self.problem, self.directory = problem, directory
+        self.mu = problem.segment.material.mu
+        self.system = CellSystem(problem)
+        self.energy = StoredEnergy(problem)
+        self.slopes = ShapeSlopes(problem) if slopes else None
+        self.options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
+        self.walked = []  # PathStates of the scout, their parameter the pressure
+        self.kept = []  # (CellState, state array) of the free states
+        self.states = []  # what states.json says
+
+    def scout(self, top, share):
+        """(top pressure, limit pressure or None), MPa: `top`, or `share` of the limit load where that is
+        less."""
+        system, limit = self.system, None
+        path = EquilibriumPath(
+            system,
+            VolumeControl(),
+            replace(self.options, relative_tolerance=SCOUT_TOLERANCE),
+            system.volume(),
+        )
+        rest = path.parameter
+        self.walked = [self._walked(path)]
+
+        def keep(step):
+            self.walked.append(self._walked(path))
+            if path.limit_points or system.load >= top:
+                raise _Enough
+
+        try:
+            run_steps(
+                path, FURTHEST * rest, StepSize(FIRST * rest, 1e-3 * FIRST * rest, LARGEST * rest), keep
+            )
+        except _Enough:
+            pass
+        except ConvergenceError:
+            # what the path has reached is used; that it ended is told below
+            limit = max(a.load for a in self.walked)
+        if path.limit_points:
+            limit = path.limit_points[0].load
+        highest = max(a.load for a in self.walked)
+        if limit is None and highest < top:
+            limit = highest
+        if limit is not None and share * limit < top:
+            return share * limit, limit
+        return top, limit
+
+    @staticmethod
+    def _walked(path):
+        last = path.accepted[-1]
+        return replace(last, parameter=last.load)
+
+    def free(self, levels):
+        """Record the free states at increasing pressures (n,), MPa."""
+        system = self.system
+        crest = int(np.argmax([a.load for a in self.walked]))
+        rising = self.walked[: crest + 1]
+        system.load = 0.0
+        system.state = rising[0].state.copy()
+        path = EquilibriumPath(system, LoadControl(), self.options)
+        self._record(path.accepted[0].state, 0.0, "free")
+        for pressure in levels[1:]:
+            near = sorted(rising, key=lambda a: abs(a.load - pressure))[: EquilibriumPath.memory]
+            path.resume(sorted(near, key=lambda a: -abs(a.load - pressure)), np.inf)
+            try:
+                *_, residual = path.advance(pressure)
+            except NotConverged:
+                # from the last level, in steps
+                path.resume([self._as_walked(*self.kept[-1])], np.inf)
+                step = pressure - path.parameter
+                result = run_steps(path, pressure, StepSize(step / 4, step / 256))
+                residual = result.steps[-1].residual
+            self._record(system.state.copy(), residual, "free")
+            path.newton.current = True  # measuring has factorised here
+
+    def _as_walked(self, state, array):
+        return PathState(state.pressure, state.pressure, array, state.volume)
+
+    def _record(self, array, residual, kind, system=None):
+        system = system or self.system
+        state = system.measure()
+        slopes = {}
+        if kind == "free":
+            slopes = self._slopes(system, len(self.kept))
+            self.kept.append((state, array.copy()))
+        scale = self.mu * self.problem.segment.pitch**2
+        row = {
+            "kind": kind,
+            "pressure": state.pressure,
+            "strains": [*state.strains.e, *state.strains.k],
+            "forces": [*state.force, *state.moment],
+            "stiffness": state.stiffness.tolist(),
+            "volume": state.volume,
+            "energy": self.energy.value(),
+            "unstable": state.unstable,
+            "largest_stretch": state.largest_stretch,
+            "residual": residual / scale,
+            "wall_distance": state.wall_distance,
+            "contact": state.contact is not None,
+            "contact_force": state.contact.force,
+            **slopes,
+        }
+        self.states.append(row)
+        write_text(self.directory / STATES, json.dumps(self.states, default=float))
+
+    def _slopes(self, system, number):
+        """What a row says of the free state's derivatives by the shape: hifi.cell.shape_slopes."""
+        if not self.slopes:
+            return {}
+        strains, stiffness = self.slopes.of(system, stiffness=number % STIFFNESS_SLOPES_EVERY == 0)
+        return {"strain_slopes": strains.tolist()} | (
+            {} if stiffness is None else {"stiffness_slopes": stiffness.tolist()}
+        )
+
+    def prescribed(self, wanted):
+        """Record the states of `wanted` ([{"level", "amplitude", "direction"}]); returns why some are missing
+        (n,) texts."""
+        missing = []
+        for w in wanted:
+            index = max(1, round(w["level"] * (len(self.kept) - 1)))
+            state, array = self.kept[index]
+            q = array[-6:]
+            try:
+                self._hold(
+                    state.pressure,
+                    array,
+                    prescribed_change(q, state.stiffness, w["amplitude"], w["direction"]),
+                )
+            except (ConvergenceError, NotConverged) as error:
+                missing.append(str(error))
+        return missing
+
+    def _hold(self, pressure, array, change):
+        system = CellSystem(self.problem, np.ones(6, bool), (pressure, 0.0), (array[-6:].copy(), change))
+        try:
+            system.state = array.copy()
+            path = EquilibriumPath(system, LoadControl(), self.options)
+            result = run_steps(path, 1.0, StepSize(HOLD_STEP, SMALLEST_HOLD_STEP, HOLD_STEP))
+            self._record(system.state, result.steps[-1].residual, "prescribed", system)
+        finally:
+            system.destroy()
+
+
+def first_touch(states):
+    """Pressure (MPa) at which walls touch on the way through the free states (hifi.contact.touch); None where they do
+    not."""
+    watch, met = TouchWatch(), None
+    for s in states:
+        if s["kind"] == "free":
+            met = watch.see(
+                Load(s["pressure"]), s["wall_distance"], contact_force=s["contact_force"]
+            ).walls_from
+    return met and met.pressure
+
+
+def prescribed_change(q, stiffness, amplitude, direction):
+    """(6,) strains from the free ones q to the prescribed ones: see hifi.runs.campaign.sample.Prescribed."""
+    if direction is None:
+        return (amplitude - 1) * (q - REST)
+    values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
+    if values[0] <= 0:
+        raise ConvergenceError("the free state is unstable")
+    energy = q[3:] @ stiffness[3:, 3:] @ q[3:] / 2
+    return amplitude * np.sqrt(2 * energy) * vectors @ ((vectors.T @ np.asarray(direction)) / np.sqrt(values))

@@ -1,0 +1,261 @@
+"""CAMPAIGN.toml: which designs are computed on which meshes, spread out into the cases of hifi.runs.cases."""
+
+import json
+from dataclasses import asdict, dataclass
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.toml import as_table, number, read_toml, refuse_unknown, to_table
+from pneunet.base.materials.laws import material_to_table
+from pneunet.base.system.processes import Limits
+from pneunet.geometry.parameters import KINDS
+from pneunet.hifi.runs.campaign.sample import PLACES, RANGES, prescribed_states, segments
+from pneunet.hifi.runs.cases import Case
+
+FUNCTION = "hifi.campaign_case:solve_campaign_case"
+#: s; one case
+DEFAULT_TIME = 3600.0
+#: index of the first edge design, and what their seed is more: both sequences can be extended
+EDGES, EDGE_SEED = 100_000, 200
+KEYS = (
+    "kinds",
+    "designs",
+    "edge_designs",
+    "seed",
+    "held_out_every",
+    "levels",
+    "top_pressure_over_mu",
+    "limit_share",
+)
+KEYS += ("further", "mesh", "ranges", "edge_ranges", "limits")
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """What geometry.cad.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th
+    designs, from the first, are computed on it, and further ones where it is 1.
+
+    prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free
+    states of designs that are not held out are differentiated by the shape.
+    """
+
+    name: str
+    settings: dict
+    every: int = 1
+    prescribed: int = 0
+    prescribed_every: int = 1
+    slopes: bool = False
+
+    def prescribed_of(self, index):
+        """How many prescribed states the design has."""
+        return self.prescribed if index // self.every % self.prescribed_every == 0 else 0
+
+
+@dataclass(frozen=True)
+class Design:
+    """One case: what is computed, and what the data set says about where it stands in the sample."""
+
+    kind: str
+    index: int
+    mesh: Mesh
+    held_out: bool
+    segment: object
+    case: Case
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """designs in the order of computing: by index, so that a campaign that is ended half way is a smaller
+    one."""
+
+    designs: tuple
+    kinds: tuple
+    meshes: tuple
+    ranges: dict
+    limits: Limits
+    table: dict
+
+
+def read_campaign(path):
+    """The Campaign in a TOML file; InputError that names key and fix otherwise."""
+    data, where = read_toml(path), str(path)
+    refuse_unknown(data, KEYS, where)
+
+    def value(key, default, low, high, integer=False):
+        v = number(data.get(key, default), key, where, integer=integer)
+        if not low <= v <= high:
+            raise InputError(f"{where}: {key} = {v:g} must lie in {low:g}..{high:g}")
+        return v
+
+    kinds = data.get("kinds", list(KINDS))
+    if not isinstance(kinds, list) or not kinds or any(k not in KINDS for k in kinds):
+        raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting'")
+    edges = value("edge_designs", 0, 0, 100_000, integer=True)
+    count = value("designs", 250, 0 if edges else 1, 100_000, integer=True)
+    seed = value("seed", 1, 0, 2**31, integer=True)
+    held_out_every = value("held_out_every", 5, 2, 1000, integer=True)
+    common = {
+        "levels": value("levels", 8, 2, 100, integer=True),
+        "top_pressure": float(value("top_pressure_over_mu", 0.3, 1e-3, 10)),
+        "limit_share": float(value("limit_share", 0.9, 0.1, 0.99)),
+    }
+    meshes = _meshes(data.get("mesh", [{"name": "coarse", "mesh_size_mm": 2.0}]), where)
+    ranges = _ranges(data, "ranges", kinds, where, RANGES)
+    edge_ranges = _ranges(data, "edge_ranges", kinds, where, ranges)
+    limits = as_table(data.get("limits", {}), f"{where} [limits]")
+    refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
+    further = _further(data, kinds, count, where)
+    designs, places = [], max(m.prescribed for m in meshes)
+    for kind in kinds:
+        # (name of the ranges, those, places in the sequence, index of the first, seed, whether they are edge
+        # designs)
+        own = [*range(count), *further[kind]]
+        sequences = (
+            ("ranges", ranges, own, 0, seed, False),
+            ("edge_ranges", edge_ranges, range(edges), EDGES, seed + EDGE_SEED, True),
+        )
+        for name, box, positions, first, start, at_edges in sequences:
+            size = max(positions, default=-1) + 1
+            try:
+                bodies = segments(kind, box[kind], size, start, at_edges)
+            except InputError as error:
+                raise InputError(f"{where} [{name}.{kind}]: they hold impossible bodies: {error}") from None
+            states = prescribed_states(kind, size, places, start)
+            for position in positions:
+                index = first + position
+                judge = not at_edges and is_held_out(index, held_out_every)
+                for mesh in meshes:
+                    if mesh.every == 1 or index % mesh.every == 0 and index < count:
+                        settings = common | {"slopes": mesh.slopes and not judge}
+                        case = _case(
+                            kind,
+                            index,
+                            mesh,
+                            bodies[position],
+                            states[position][: mesh.prescribed_of(index)],
+                            settings,
+                        )
+                        designs.append(Design(kind, index, mesh, judge, bodies[position], case))
+    designs.sort(key=lambda d: d.index)
+    table = {
+        "designs": count,
+        "edge_designs": edges,
+        "seed": seed,
+        "held_out_every": held_out_every,
+        **common,
+    }
+    table["further"] = {kind: len(indices) for kind, indices in further.items()}
+    table["edge_ranges"] = {
+        k: {name: r for name, r in edge_ranges[k].items() if r != ranges[k][name]} for k in kinds
+    }
+    return Campaign(
+        tuple(designs),
+        tuple(kinds),
+        meshes,
+        ranges,
+        Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")),
+        table,
+    )
+
+
+def on_offer(campaign, kind, count):
+    """[(index, Segment)] of the next `count` designs of the sample after a Campaign's that could be further
+    ones: neither held out nor among its own."""
+    start, known = campaign.table["designs"], {d.index for d in campaign.designs if d.kind == kind}
+    bodies = segments(kind, campaign.ranges[kind], start + count, campaign.table["seed"])
+    free = (
+        i
+        for i in range(start, start + count)
+        if i not in known and not is_held_out(i, campaign.table["held_out_every"])
+    )
+    return [(i, bodies[i]) for i in free]
+
+
+def is_held_out(index, every):
+    """Every n-th design, never the first: chosen by index alone, before anything is computed."""
+    return index % every == every - 1
+
+
+def _case(kind, index, mesh, segment, prescribed, common):
+    inputs = {
+        "segment": to_table(segment),
+        "material": material_to_table(segment.material),
+        "mesh": mesh.settings,
+        **common,
+        "prescribed": [asdict(p) for p in prescribed],
+    }
+    # through JSON, so that inputs are what the record on disk will hold
+    return Case(FUNCTION, json.loads(json.dumps(inputs)), f"{kind} {index} {mesh.name}")
+
+
+def _meshes(rows, where):
+    if not isinstance(rows, list) or not rows:
+        raise InputError(f"{where}: meshes are written [[mesh]], with double brackets")
+    meshes = []
+    for i, row in enumerate(rows, start=1):
+        at = f"{where} [[mesh]] {i}"
+        refuse_unknown(
+            row,
+            ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every", "slopes"],
+            at,
+        )
+        for key in ("name", "mesh_size_mm"):
+            if key not in row:
+                raise InputError(f"{at}: key '{key}' is missing")
+        settings = {}
+        for key in ("mesh_size_mm", "edge_size_mm"):
+            if key in row:
+                settings[key] = float(number(row[key], key, at))
+                if not 0.02 <= row[key] <= 20:
+                    raise InputError(f"{at}: {key} = {row[key]:g} must lie in 0.02..20")
+        counts = []
+        for key, default, low, high in (
+            ("every", 1, 1, 10_000),
+            ("prescribed", 0, 0, PLACES),
+            ("prescribed_every", 1, 1, 10_000),
+        ):
+            counts.append(number(row.get(key, default), key, at, integer=True))
+            if not low <= counts[-1] <= high:
+                raise InputError(f"{at}: {key} = {counts[-1]} must lie in {low}..{high}")
+        slopes = row.get("slopes", False)
+        if not isinstance(slopes, bool):
+            raise InputError(f"{at}: slopes = {slopes!r} must be true or false")
+        meshes.append(Mesh(str(row["name"]), settings, *counts, slopes))
+    if len({m.name for m in meshes}) < len(meshes):
+        raise InputError(f"{where}: two [[mesh]] have the same name")
+    return tuple(meshes)
+
+
+def _further(data, kinds, count, where):
+    """{kind: indices} of [further], designs of the sample beyond the first `count`."""
+    where = f"{where} [further]"
+    table = as_table(data.get("further", {}), where)
+    refuse_unknown(table, kinds, where)
+    for kind, indices in table.items():
+        whole = isinstance(indices, list) and all(
+            isinstance(i, int) and not isinstance(i, bool) for i in indices
+        )
+        if not whole or len(set(indices)) < len(indices) or any(not count <= i < EDGES for i in indices):
+            raise InputError(
+                f"{where}: {kind} must be a list of different whole numbers in {count}..{EDGES - 1}"
+            )
+    return {kind: table.get(kind, []) for kind in kinds}
+
+
+def _ranges(data, name, kinds, where, default):
+    """{kind: {variable: (low, high)}}: the default ones, replaced by [NAME.KIND]."""
+    where = f"{where} [{name}]"
+    table = as_table(data.get(name, {}), where)
+    refuse_unknown(table, KINDS, where)
+    out = {}
+    for kind in kinds:
+        own = as_table(table.get(kind, {}), f"{where}.{kind}")
+        refuse_unknown(own, RANGES[kind], f"{where}.{kind}")
+        out[kind] = dict(default[kind])
+        for key, both in own.items():
+            if not isinstance(both, list) or len(both) != 2:
+                raise InputError(f"{where}.{kind}: {key} must be [low, high]")
+            low, high = (float(number(v, key, f"{where}.{kind}")) for v in both)
+            if not low < high:
+                raise InputError(f"{where}.{kind}: {key} = [{low:g}, {high:g}]: write the lower value first")
+            out[kind][key] = (low, high)
+    return out

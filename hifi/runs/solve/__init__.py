@@ -1,0 +1,1 @@
+"""`pneunet solve`: one manipulator, with tables, fields and checkpoints."""

@@ -1,0 +1,141 @@
+"""checkpoint.npz: the memory of an equilibrium path on disk, for a run that goes on after a kill on any
+number of ranks.
+
+It holds the accepted states that the predictor extrapolates and the state at which the lagged tangent was
+factorised, so that the run which goes on iterates as the killed one would have. Values are stored with the
+undeformed coordinates of their nodes, sorted by them: each rank finds its own.
+"""
+
+import io
+import json
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from scipy.spatial import cKDTree
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import atomic_path
+from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.path.equilibrium import LimitPoint, PathState
+from pneunet.hifi.path.stepping import Step
+
+NAME = "checkpoint.npz"
+#: mm; nodes of another mesh are further apart than this, and one that is moved by the rounding of its file is
+#: not
+NEAR = 1e-6
+
+
+def save(directory, path, step, stage, identity):
+    """Write the EquilibriumPath of a hifi.body.system.BodySystem after `step` of a `stage`; collective. OSError on
+    all ranks.
+
+    identity: {name: JSON value} of what the run is of; `read` compares it.
+    """
+    problem, newton = path.system.problem, path.newton
+    factorised = [newton.factorised_at] if newton.current else []
+    states = [a.state for a in path.accepted] + [state for state, _ in factorised]
+    content = {
+        "belongs_to": _text(identity),
+        "stage": stage,
+        "step": np.array(astuple(step), float),
+        "parameter": np.array([a.parameter for a in path.accepted]),
+        "load": np.array([a.load for a in path.accepted] + [load for _, load in factorised]),
+        "volume": np.array([a.volume for a in path.accepted]),
+        "trusted": np.array(path.trusted),
+        "first_compliance": np.array(path.first_compliance),
+        "limit_points": np.array(
+            [[p.load, p.volume, p.kind == "maximum"] for p in path.limit_points]
+        ).reshape(-1, 3),
+        "timings": np.array(list(newton.timings.values())),
+    }
+    for name, dofs, nodes, owned in _fields(problem):
+        X = _gather(problem.mesh.comm, nodes[:owned])
+        values = [_gather(problem.mesh.comm, state[dofs[:owned]]) for state in states]
+        if problem.mesh.comm.rank == 0:
+            order = np.lexsort(np.round(X, 6).T)
+            content |= {f"{name}_nodes": X[order], name: np.array(values)[:, order]}
+
+    def write():
+        # a zip file on a full disk fails a second time, out of reach, when Python discards it
+        archive = io.BytesIO()
+        np.savez(archive, **content)
+        with atomic_path(Path(directory) / NAME) as temporary:
+            temporary.write_bytes(archive.getbuffer())
+
+    on_rank_0(problem.mesh.comm, write)
+
+
+def read(directory, identity):
+    """{name: array} of the checkpoint in `directory`, None without one; InputError when it is of something
+    else than `identity`."""
+    path = Path(directory) / NAME
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            content = dict(stored)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: cannot be read ({error}): solve without --resume") from None
+    theirs, ours = json.loads(str(content["belongs_to"])), json.loads(_text(identity))
+    size = theirs["mesh_size_mm"]
+    if size != ours["mesh_size_mm"]:
+        raise InputError(f"{path}: mesh_size_mm is {size:g} there: add --mesh-size-mm {size:g}")
+    for name, value in ours.items():
+        if theirs.get(name) != value:
+            raise InputError(f"{path}: belongs to another {name} than the design's: solve without --resume")
+    return content
+
+
+def restore(content, path):
+    """Put the EquilibriumPath where the checkpoint was written; its Step. Collective; InputError when the
+    mesh is another."""
+    problem = path.system.problem
+    states = np.zeros((len(content["load"]), len(problem.array)))
+    furthest, sizes = 0.0, True
+    for name, dofs, nodes, owned in _fields(problem):
+        distance, index = cKDTree(content[f"{name}_nodes"]).query(nodes)
+        furthest = max(furthest, distance.max(initial=0.0))
+        sizes &= problem.mesh.comm.allreduce(owned, op=MPI.SUM) == len(content[f"{name}_nodes"])
+        states[:, dofs] = content[name][:, index]
+    furthest = problem.mesh.comm.allreduce(furthest, op=MPI.MAX)
+    if furthest > NEAR or not sizes:
+        raise InputError(
+            f"{NAME}: belongs to another mesh (a node is {furthest:.1e} mm away): solve without --resume"
+        )
+    loads, parameters = content["load"].tolist(), content["parameter"].tolist()
+    accepted = [PathState(*each) for each in zip(parameters, loads, states, content["volume"].tolist())]
+    factorised_at = (states[-1], loads[-1]) if len(states) > len(accepted) else None
+    path.resume(accepted, float(content["trusted"]), factorised_at)
+    path.first_compliance = float(content["first_compliance"])
+    path.limit_points = [
+        LimitPoint(p, v, "maximum" if top else "minimum") for p, v, top in content["limit_points"].tolist()
+    ]
+    path.newton.timings = dict(zip(path.newton.timings, content["timings"].tolist()))
+    number, load, iterations, factorisations, *rest = content["step"].tolist()
+    return Step(int(number), load, int(iterations), int(factorisations), *rest)
+
+
+def _text(identity):
+    return json.dumps(identity, default=float, sort_keys=True)
+
+
+def _fields(problem):
+    """(name, index into the state array, coordinates in mm, number of owned nodes) of both fields, ghosts
+    included."""
+    space, dofs = problem.pressure_space, problem.pressure_dofs
+    return (
+        ("displacement_mm", problem.displacement_dofs, problem.nodes, problem.owned_nodes),
+        (
+            "multiplier_MPa",
+            dofs,
+            space.tabulate_dof_coordinates()[: len(dofs)],
+            space.dofmap.index_map.size_local,
+        ),
+    )
+
+
+def _gather(comm, rows):
+    parts = comm.gather(rows, root=0)
+    return np.concatenate(parts) if comm.rank == 0 else None

@@ -1,0 +1,1 @@
+"""`pneunet study`: bodies over a grid or a list."""

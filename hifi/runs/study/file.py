@@ -1,0 +1,227 @@
+"""STUDY.toml: one body and what is varied in it, spread out into the cases of hifi.runs.cases.
+
+A variable is a path into the tables of the body, `segment.2.angle_deg` or `material.mu_MPa`; the parameters
+of segments and materials are known by their bare names too. So whatever a CELL.toml or design.toml can say
+can be varied.
+"""
+
+import copy
+import itertools
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.toml import as_table, file_key, number, read_toml, refuse_unknown
+from pneunet.base.materials.laws import LAWS
+from pneunet.base.system.processes import Limits
+from pneunet.geometry.designfile import design_from_tables, design_tables
+from pneunet.geometry.parameters import Segment
+from pneunet.hifi.cell.file import cell_from_tables, cell_tables
+from pneunet.hifi.runs.cases import Case
+
+KINDS = ("cell", "segment", "manipulator")
+SEGMENT_KEYS = [file_key(f) for f in fields(Segment) if "unit" in f.metadata]
+MATERIAL_KEYS = ["silicone", "law"] + sorted(
+    {file_key(f) for law in LAWS.values() for f in fields(law)} - {"name", "source"}
+)
+#: keys which say what a material is: the table that stood there before means nothing any more
+NAMES_OF_MATERIALS = ("silicone", "law")
+#: values at the top of a design.toml and of a CELL.toml, and at that of the latter alone
+COMMON_KEYS = ("pressure_kPa", "mesh_size_mm", "contact")
+CELL_KEYS = (*COMMON_KEYS, "control", "volume_factor")
+DEFAULT_LEVELS = 10
+#: s; one case
+DEFAULT_TIME = 3600.0
+
+
+@dataclass(frozen=True)
+class StudyCase:
+    """One row of the list or grid: {variable as the user wrote it: value}, its case, or why there can be
+    none."""
+
+    values: dict
+    case: Case | None
+    refusal: str = ""
+
+    @property
+    def label(self):
+        return ", ".join(f"{name} = {value}" for name, value in self.values.items()) or "the body as it is"
+
+
+@dataclass(frozen=True)
+class Study:
+    """cases: StudyCase in order; variables: names of what is varied; limits: of one case."""
+
+    kind: str
+    variables: tuple
+    cases: tuple
+    limits: Limits
+
+
+def read_study(path):
+    """The Study in a TOML file; InputError that names key and fix otherwise.
+
+    A combination of the grid that is no valid body is kept with its refusal, a listed case or a whole grid of
+    them is an error.
+    """
+    data, where = read_toml(path), str(path)
+    for key, fix in (
+        ("kind", "write 'cell', 'segment' or 'manipulator'"),
+        ("base", 'write the body as [base], or base = "FILE.toml"'),
+    ):
+        if key not in data:
+            raise InputError(f"{where}: key '{key}' is missing: {fix}")
+    refuse_unknown(data, ["kind", "base", "levels", "limits", "grid", "case"], where)
+    kind = data["kind"]
+    if kind not in KINDS:
+        raise InputError(f"{where}: kind = {kind!r} is not known: write 'cell', 'segment' or 'manipulator'")
+    base = _base(data["base"], kind, Path(path))
+    levels = number(data.get("levels", base.get("levels", DEFAULT_LEVELS)), "levels", where, integer=True)
+    if not 1 <= levels <= 1000:
+        raise InputError(f"{where}: levels = {levels} must lie in 1..1000")
+    listed, grid = _varied(data, base, where)
+    cases = []
+    for row in listed:
+        for combination in itertools.product(*grid.values()):
+            cases.append(_study_case(kind, base, levels, {**row, **dict(zip(grid, combination))}, where))
+    refused = [case.refusal for case in cases if case.case is None]
+    if refused and (not grid or len(refused) == len(cases)):
+        raise InputError(refused[0])
+    variables = tuple(dict.fromkeys([*(name for row in listed for name in row), *grid]))
+    return Study(kind, variables, tuple(cases), _limits(data.get("limits", {}), f"{where} [limits]"))
+
+
+def _base(base, kind, path):
+    """The tables of the body that is varied: written in the study, or in a file beside it."""
+    if isinstance(base, str):
+        base = read_toml(path.parent / base)
+    base = as_table(base, f"{path} [base]")
+    if "segment" not in base:
+        raise InputError(f"{path} [base]: key 'segment' is missing: write [base.segment]")
+    segment = base["segment"]
+    single = isinstance(segment, dict)
+    if kind == "cell" and not single:
+        raise InputError(
+            f"{path} [base]: a cell has one segment: write [base.segment], or kind = 'manipulator'"
+        )
+    if kind == "segment" and not single and len(segment) != 1:
+        raise InputError(f"{path} [base]: {len(segment)} segments: write kind = 'manipulator'")
+    if kind != "cell" and single:
+        base["segment"] = [segment]
+    return base
+
+
+def _varied(data, base, where):
+    """(list of {variable: value}, {variable: list of values}) of [[case]] and [grid]."""
+    rows = data.get("case", [{}])
+    if not isinstance(rows, list):
+        raise InputError(f"{where}: cases are written [[case]], with double brackets")
+    listed = [_flat(as_table(row, f"{where} [[case]] {i}")) for i, row in enumerate(rows, start=1)]
+    grid = _flat(as_table(data.get("grid", {}), f"{where} [grid]"))
+    if not grid and "case" not in data:
+        raise InputError(f"{where}: nothing is varied: write [grid] with key = [values], or [[case]] tables")
+    known = [
+        *SEGMENT_KEYS,
+        *MATERIAL_KEYS,
+        *(COMMON_KEYS if isinstance(base["segment"], list) else CELL_KEYS),
+    ]
+    for table, name in [(row, f"[[case]] {i}") for i, row in enumerate(listed, start=1)] + [(grid, "[grid]")]:
+        bare = {key: value for key, value in table.items() if "." not in key and key not in base}
+        refuse_unknown(bare, known, f"{where} {name}")
+    for key, values in grid.items():
+        if not isinstance(values, list) or not values:
+            raise InputError(
+                f"{where} [grid]: {key} = {values!r} must be a list of values: write {key} = [{values!r},"
+                " ...]"
+            )
+        if key in listed[0]:
+            raise InputError(f"{where} [grid]: '{key}' is in the list of cases too: leave it out of one")
+    return listed, grid
+
+
+def _flat(table, prefix=""):
+    """{"a.b": value} of nested tables, which TOML makes of dotted keys."""
+    out = {}
+    for key, value in table.items():
+        out |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+    return out
+
+
+def _study_case(kind, base, levels, values, where):
+    try:
+        function, inputs = _inputs(kind, base, levels, values, where)
+    except InputError as error:
+        return StudyCase(values, None, str(error))
+    # through JSON, so that inputs are what the record on disk will hold
+    inputs = json.loads(json.dumps(inputs, default=lambda array: array.tolist()))
+    return StudyCase(values, Case(function, inputs, StudyCase(values, None).label))
+
+
+def _inputs(kind, base, levels, values, where):
+    """(function, its complete inputs) of the body with these values."""
+    tables = copy.deepcopy(base)
+    name = ", ".join(f"{key} = {value}" for key, value in values.items())
+    where = f"{where} ({name})" if name else where
+    # a material's name first: other keys of the case change values in it
+    for name in sorted(values, key=lambda name: name.rpartition(".")[2] not in NAMES_OF_MATERIALS):
+        try:
+            _put(tables, _path(name), values[name])
+        except (AttributeError, TypeError, ValueError):
+            raise InputError(
+                f"{where}: '{name}' leads nowhere in the body; segments are counted from 1,"
+                " segment.1.angle_deg"
+            ) from None
+    if kind == "cell":
+        return "hifi.study_cases:solve_cell_case", cell_tables(
+            cell_from_tables({**tables, "levels": levels}, where)
+        )
+    design = design_from_tables(tables, where)
+    return "hifi.study_cases:solve_design_case", {"design": design_tables(design), "levels": levels}
+
+
+def _path(name):
+    if name in SEGMENT_KEYS:
+        return ["segment", name]
+    return ["material", name] if name in MATERIAL_KEYS else name.split(".")
+
+
+def _put(table, path, value):
+    """Set what `path` leads to; a list of tables is entered by a number from 1, or in all its tables."""
+    if isinstance(table, list):
+        chosen, rest = (
+            ([table[range(1, len(table) + 1).index(int(path[0]))]], path[1:])
+            if path[0].isdigit()
+            else (table, path)
+        )
+        for each in chosen:
+            _put(each, rest, value)
+    elif path[0].isdigit():
+        raise ValueError("a number enters a list only")
+    elif len(path) == 1:
+        if path[0] in NAMES_OF_MATERIALS:
+            table.clear()
+        table[path[0]] = value
+    else:
+        _put(table.setdefault(path[0], {}), path[1:], value)
+
+
+def _limits(table, where):
+    refuse_unknown(table, ["time_s", "memory_MB"], where)
+    for key, value in table.items():
+        if not number(value, key, where) > 0:
+            raise InputError(f"{where}: {key} = {value:g} must be larger than 0")
+    return Limits(table.get("time_s", DEFAULT_TIME), table.get("memory_MB"))
+
+
+def value_of(name, study_case, default=""):
+    """What the column of variable `name` shows: the case's value, or the body's where other cases vary it."""
+    if name in study_case.values or study_case.case is None:
+        return study_case.values.get(name, default)
+    found = study_case.case.inputs.get("design", study_case.case.inputs)
+    for step in _path(name):
+        if isinstance(found, list):
+            found = found[int(step) - 1] if step.isdigit() else found[0].get(step, default)
+        elif isinstance(found, dict):
+            found = found.get(step, default)
+    return found

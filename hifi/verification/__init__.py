@@ -1,0 +1,1 @@
+"""Problems with known answers: exact solutions, published benchmarks, patches, the shipped body."""

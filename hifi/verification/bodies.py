@@ -1,0 +1,133 @@
+"""Meshes of bodies with known solutions: round ones with second-order geometry, boxes and what a map makes of
+them (mm).
+
+Faces are tagged alike: the planes x, y, z = 0, the inner and the outer surface of a round body, the far ends.
+"""
+
+import gmsh
+import numpy as np
+from dolfinx.mesh import CellType, create_box, locate_entities_boundary, meshtags
+from mpi4py import MPI
+
+from pneunet.hifi.fem import compat
+
+INNER, PLANE_X, PLANE_Y, PLANE_Z, OUTER, END, END_Y, END_Z = range(1, 9)
+
+
+def round_body(folder, name, size, solid=1):
+    """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or
+    axis; solid: tag of its cells."""
+    comm, path = MPI.COMM_WORLD, folder / f"{name}.msh"
+    if comm.rank == 0:
+        gmsh.initialize()
+        gmsh.option.setNumber("General.Terminal", 0)
+        draw, classify, radius = ROUND[name]
+        volume = draw()
+        gmsh.model.occ.synchronize()
+        groups = {}
+        for _, face in gmsh.model.getBoundary([(3, volume)], oriented=False):
+            groups.setdefault(classify(gmsh.model.getBoundingBox(2, face)), []).append(face)
+        for tag, faces in groups.items():
+            gmsh.model.addPhysicalGroup(2, faces, tag)
+        gmsh.model.addPhysicalGroup(3, [volume], solid)
+        grading = gmsh.model.mesh.field.add("MathEval")
+        gmsh.model.mesh.field.setString(grading, "F", f"{size}*{radius}")
+        gmsh.model.mesh.field.setAsBackgroundMesh(grading)
+        for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints"):
+            gmsh.option.setNumber(f"Mesh.{option}", 0)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(path))
+        gmsh.finalize()
+    comm.barrier()
+    return compat.read_mesh(path, comm)
+
+
+def _octant(solid, length=3.0):
+    box = gmsh.model.occ.addBox(0, 0, 0, length, 3, 3)
+    return gmsh.model.occ.intersect(solid, [(3, box)])[0][0][1]
+
+
+def sphere():
+    """An eighth of a sphere with radii 1 and 2."""
+    occ = gmsh.model.occ
+    return _octant(occ.cut([(3, occ.addSphere(0, 0, 0, 2))], [(3, occ.addSphere(0, 0, 0, 1))])[0])
+
+
+#: axial length of the slice of a tube
+SLICE = 0.25
+
+
+def tube():
+    """A quarter of a slice of a tube along x with radii 1 and 2."""
+    occ = gmsh.model.occ
+    return _octant(
+        occ.cut(
+            [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 2))], [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 1))]
+        )[0]
+    )
+
+
+def cylinder(layers=4):
+    """Solid cylinder of radius 1 and length 1 along x, its mesh the same on both ends."""
+    occ = gmsh.model.occ
+    disk = [(2, occ.addDisk(0, 0, 0, 1, 1))]
+    occ.rotate(disk, 0, 0, 0, 0, 1, 0, np.pi / 2)
+    return next(tag for dim, tag in occ.extrude(disk, 1, 0, 0, numElements=[layers]) if dim == 3)
+
+
+def _hollow_faces(box, end=3.0):
+    for tag, low in ((PLANE_X, 0), (PLANE_Y, 1), (PLANE_Z, 2)):
+        if box[low + 3] < 1e-4:
+            return tag
+    if box[0] > end - 1e-4:
+        return END
+    return INNER if max(box[4:]) < 1.5 else OUTER
+
+
+def _cylinder_faces(box):
+    return PLANE_X if box[3] < 1e-4 else END if box[0] > 1 - 1e-4 else OUTER
+
+
+#: name -> (draws the solid and returns its volume, tag of a face from its bounding box, what edge lengths go
+#: with)
+ROUND = {
+    "sphere": (sphere, _hollow_faces, "sqrt(x*x+y*y+z*z)"),
+    "tube": (tube, lambda box: _hollow_faces(box, SLICE), "sqrt(y*y+z*z)"),
+    "cylinder": (cylinder, _cylinder_faces, "1"),
+}
+
+
+def box(lengths, counts, move=None, solid=1):
+    """(mesh, cell tags, facet tags) of a box from the origin, each of its (nx, ny, nz) bricks cut into 6
+    tetrahedra.
+
+    move: X (n, 3) -> (n, 3), where its vertices go; facet tags are those of the box before. solid: tag of its
+    cells.
+    """
+    mesh = create_box(MPI.COMM_WORLD, [[0.0, 0.0, 0.0], list(lengths)], list(counts), CellType.tetrahedron)
+    where, tags = [], []
+    for axis, ends in enumerate(((PLANE_X, END), (PLANE_Y, END_Y), (PLANE_Z, END_Z))):
+        for tag, place in zip(ends, (0.0, lengths[axis])):
+            where.append(
+                locate_entities_boundary(
+                    mesh, 2, lambda x, axis=axis, place=place: np.isclose(x[axis], place)
+                )
+            )
+            tags.append(np.full(len(where[-1]), tag, np.int32))
+    facets, tags = np.concatenate(where), np.concatenate(tags)
+    order = np.argsort(facets)
+    cells = mesh.topology.index_map(3)
+    cells = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
+    if move is not None:
+        mesh.geometry.x[:] = move(mesh.geometry.x)
+    return (
+        mesh,
+        meshtags(mesh, 3, cells, np.full(len(cells), solid, np.int32)),
+        meshtags(mesh, 2, facets[order], tags[order]),
+    )
+
+
+def strip(lengths, counts):
+    """A box along x whose axis runs through the middle of its section."""
+    return box(lengths, counts, lambda X: X - [0.0, lengths[1] / 2, lengths[2] / 2])

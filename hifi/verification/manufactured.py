@@ -1,0 +1,91 @@
+"""A manufactured solution: incompressible finite strain chosen first, the forces it needs derived by hand.
+
+Two shears, each of a coordinate by the two others, make a deformation with det F = 1; with q = p - mu I1/3
+the first Piola-Kirchhoff stress of the neo-Hookean body is P = mu F + q F^-T there, and since the columns of
+F^-T have no divergence, the body force is -(mu lap u + F^-T grad q). A unit cube, held at its exact
+displacement but for x = 1, where the traction P N acts.
+"""
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from pneunet.hifi.body.problem import Support
+from pneunet.hifi.fem import compat
+from pneunet.hifi.verification import bodies
+from pneunet.hifi.verification.following import body_system, solve_from
+
+AMPLITUDE = 0.15
+
+
+def displacement(X, sin, cos):
+    """Components of u at X, for arrays or symbols."""
+    x = X[0] + AMPLITUDE * sin(2 * X[1] + X[2])
+    return x - X[0], 0 * X[1], AMPLITUDE * cos(2 * x + X[1])
+
+
+def shifted_pressure(X, sin, cos):
+    """q = p - mu I1/3 at X."""
+    return sin(2 * X[0] + X[2]) * cos(2 * X[1])
+
+
+def exact(X):
+    """(u, F, q, p) as functions of the symbol X."""
+    u = ufl.as_vector(displacement(X, ufl.sin, ufl.cos))
+    F, q = ufl.Identity(3) + ufl.grad(u), shifted_pressure(X, ufl.sin, ufl.cos)
+    return u, F, q, q + ufl.inner(F, F) / 3
+
+
+class Traction:
+    """Exact traction on the face x = 1."""
+
+    has_tangent, closed = False, True
+
+    def term(self, problem, u, v):
+        self.value = fem.Constant(problem.mesh, PETSc.ScalarType(0.0))
+        _, F, q, _ = exact(ufl.SpatialCoordinate(problem.mesh))
+        N = ufl.FacetNormal(problem.mesh)
+        ds = ufl.Measure(
+            "ds", domain=problem.mesh, subdomain_data=problem.facet_tags, metadata={"quadrature_degree": 6}
+        )
+        return -self.value * ufl.inner(F * N + q * ufl.inv(F).T * N, v) * ds(bodies.END)
+
+    def update(self, problem):
+        pass
+
+
+def body_force(X):
+    u, F, q, _ = exact(X)
+    return -(ufl.div(ufl.grad(u)) + ufl.inv(F).T * ufl.grad(q))
+
+
+def motion(X, load=1.0):
+    return np.stack(displacement(X.T, np.sin, np.cos), axis=1)
+
+
+def errors(cells):
+    """(L2 error of u in mm^(5/2), of p in MPa mm^(3/2), dofs) on cells^3 bricks, starting from the
+    interpolant."""
+    faces = (bodies.PLANE_X, bodies.PLANE_Y, bodies.END_Y, bodies.PLANE_Z, bodies.END_Z)
+    mesh = bodies.box((1.0, 1.0, 1.0), (cells,) * 3)
+    system = body_system(
+        mesh, [Support(tag, None, motion) for tag in faces], [Traction()], body_force=body_force
+    )
+    problem = system.problem
+    solve_from(system, 1.0, motion, lambda X: shifted_pressure(X.T, np.sin, np.cos))
+    u, p = ufl.split(problem.state)
+    u_exact, _, _, p_exact = exact(ufl.SpatialCoordinate(problem.mesh))
+    dx = ufl.Measure("dx", domain=problem.mesh, metadata={"quadrature_degree": 6})
+    found = []
+    for difference in (u - u_exact, p - p_exact):
+        square = fem.assemble_scalar(compat.compile_form(ufl.inner(difference, difference) * dx))
+        found.append(float(np.sqrt(problem.mesh.comm.allreduce(square))))
+    dofs = problem.dofs
+    system.destroy()
+    return *found, dofs
+
+
+def orders(coarse, fine, ratio=2.0):
+    """Observed orders of u and p between two results of `errors`."""
+    return tuple(float(np.log(a / b) / np.log(ratio)) for a, b in zip(coarse[:2], fine[:2]))

@@ -1,0 +1,1 @@
+"""The paper's analytic models in a consistent form."""

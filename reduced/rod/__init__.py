@@ -1,0 +1,1 @@
+"""The rod: section frames, section laws, free shape and equilibrium under load."""

@@ -1,0 +1,1 @@
+"""The law of a rod's sections that was trained on finite elements."""

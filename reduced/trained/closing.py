@@ -1,0 +1,84 @@
+"""How far the walls of one kind of cell have come nearer in free states, as if they could go on when they
+touch.
+
+Where walls touch, strains over the pressure have a kink along the path of free states, each design's at its
+own place, and from there on depend on how far the walls would overlap. So a law knows first how walls close,
+and is told the overlap.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pneunet.geometry.parameters import ONE_SIDED
+from pneunet.reduced.trained.along_inputs import AlongInputs
+from pneunet.reduced.trained.coordinates import GAP, SMALLEST, Coordinates
+from pneunet.reduced.trained.side_by_side import SideBySide
+
+
+@dataclass(frozen=True)
+class Closing:
+    """process: of States.closing at Coordinates.closing_inputs; None where too few designs were seen to
+    touch: walls are apart then.
+
+    Walls close almost in proportion to a load, Coordinates.closing_load: overlap = closing(shape, load) load
+    - gap.
+    """
+
+    kind: str
+    process: SideBySide | None
+
+    @cached_property
+    def coordinates(self):
+        return Coordinates(self.kind)
+
+    @cached_property
+    def _along(self):
+        return AlongInputs(self.process.processes[0], [-1])
+
+    @property
+    def _by_strain(self):
+        """Whether the load changes along a search for the leading strain at a pressure."""
+        return self.process is not None and self.kind == ONE_SIDED
+
+    def overlap(self, shape, pressure, lead):
+        """(n,) of walls, over the normal pitch, in free states of shape numbers (n, 13) at P/mu (n,) and the
+        leading strain (n,); less than 0 while they are apart."""
+        if self.process is None:
+            return -np.ones(len(shape))
+        load = self.coordinates.closing_load(pressure, lead)
+        return self.process(self.coordinates.closing_inputs(shape, load))[:, 0] * load - shape[:, GAP]
+
+    def closed(self, shape, pressure, strains):
+        """(n,) part of the gap that walls have closed in free states with these strains (n, 6): from 1 on
+        they touch."""
+        return 1 + self.overlap(shape, pressure, self.coordinates.leading(strains)) / np.maximum(
+            shape[:, GAP], SMALLEST
+        )
+
+    def overlap_and_slopes(self, shape, pressure, lead):
+        """(overlap (n,), its derivatives by the shape numbers and P/mu (n, 14) and by the leading strain
+        (n,))."""
+        if self.process is None:
+            return -np.ones(len(shape)), np.zeros((len(shape), shape.shape[1] + 1)), np.zeros(len(shape))
+        co, load = self.coordinates, self.coordinates.closing_load(pressure, lead)
+        closing, slopes = self.process(co.closing_inputs(shape, load), derivative=True)
+        by = co.by_shape(shape, slopes)[:, 0] * load[:, None]
+        by[:, GAP] -= 1
+        by_load = closing[:, 0] + slopes[:, 0, -1] * load
+        by[:, -1] = 0 if self._by_strain else by_load
+        return closing[:, 0] * load - shape[:, GAP], by, by_load * self._by_strain
+
+    def along(self, inputs, shape, pressure, lead):
+        """(overlap (n,), its first and second derivative by the leading strain, (n,) or 0); inputs:
+        Coordinates.inputs (n, .), of which those of the shape are taken."""
+        if self.process is None:
+            return -np.ones(len(shape)), 0.0, 0.0
+        load = self.coordinates.closing_load(pressure, lead)
+        x = self.coordinates.with_load(inputs, load)
+        if not self._by_strain:
+            return self.process(x)[:, 0] * load - shape[:, GAP], 0.0, 0.0
+        closing, slope, curvature = self._along.at(x)
+        slope = slope[:, 0]
+        return closing * lead - shape[:, GAP], closing + slope * lead, 2 * slope + curvature[:, 0, 0] * lead

@@ -1,0 +1,172 @@
+"""The free states of one kind of cell along their path, as a trained law knows them.
+
+Strains over pressure bend ever more towards a limit load, each design's at its own place, and end there.
+Along the path itself, at whatever leading strain, nothing happens at a limit load: learned is the pressure
+over the leading strain as a function of shape and leading strain, and the other strains over it. (Measured,
+against functions of the pressure: a fifth to a quarter off the 95th percentile of the error.) Where walls
+touch they have a kink, so by how much walls would overlap is an input as well. (Measured, one-sided: an
+eighth off the 95th percentile of the tip error, a fifth off the median.) The leading strain at a pressure is
+found from it by Euler's method: each step goes to where the parabola with the curve's value, slope and
+curvature meets the pressure, or to its top where it does not: beyond a limit load.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pneunet.reduced.trained.along_inputs import AlongInputs
+from pneunet.reduced.trained.closing import Closing
+from pneunet.reduced.trained.coordinates import LEADING, SMALL_STRAIN, Coordinates, cosine, odd
+from pneunet.reduced.trained.gaussian import ROWS
+from pneunet.reduced.trained.side_by_side import SideBySide
+
+#: steps over the slope that end the search, of log(leading strain): what is left after them is of third order
+#: (measured: at most 5e-5 in the leading strain, a hundredth of the law's error); the longest; how many.
+#: (Slopes next to a limit load count as FLAT there: at most 4e-6.)
+NEAR, LONGEST, MOST = 0.07, 0.7, 20
+#: of d log P/d log(leading strain), from there on next to a limit load: derivatives and deviations are no
+#: larger than there
+FLAT = 0.02
+#: of log P by which a pressure lies beyond the end of a path
+ABOVE = 1e-3
+#: places of the leading strain and the overlap among the path_inputs
+LEAD, OVERLAP = -3, -1
+
+
+@dataclass(frozen=True)
+class FreePath:
+    """closing: how walls come nearer; learned: processes of Coordinates.learned_strains at path_inputs, the
+    leading strain's by itself; start: a rough one of log(leading strain/P) at inputs; furthest: leading
+    strain up to which paths are followed."""
+
+    kind: str
+    closing: Closing
+    learned: SideBySide
+    start: SideBySide
+    furthest: float
+
+    @cached_property
+    def coordinates(self):
+        return Coordinates(self.kind)
+
+    @cached_property
+    def _last(self):
+        return float(np.log(self.furthest))
+
+    @cached_property
+    def _along(self):
+        return AlongInputs(self.learned.processes[0], [LEAD, OVERLAP])
+
+    def at(self, shape, pressure, level):
+        """(leading strain (n,), log P beyond the path's end (n,), 0 up to it, path_inputs (n, d)) at shape
+        numbers (n, 13), P/mu (n,) > 0 and the mesh's level, (n,) or a number. A path ends at its limit load,
+        or where it leaves what is known."""
+        if len(shape) > ROWS:
+            each = shape, pressure, np.broadcast_to(level, len(shape))
+            parts = [self.at(*(a[i : i + ROWS] for a in each)) for i in range(0, len(shape), ROWS)]
+            return tuple(map(np.concatenate, zip(*parts)))
+        co, last = self.coordinates, self._last
+        inputs, wanted = co.inputs(shape, pressure, level), np.log(pressure)
+        v = np.minimum(self.start(inputs)[:, 0] + wanted, last)
+        everywhere = x = np.concatenate([inputs, v[:, None]], axis=1)
+        found, overlap, beyond, searched = np.empty(len(v)), np.empty(len(v)), np.zeros(len(v)), slice(None)
+        for _ in range(MOST):
+            lead = np.exp(v)
+            over, over_slope, over_curvature = self.closing.along(x, shape, pressure, lead)
+            x[:, LEAD], x[:, OVERLAP] = np.log(lead + SMALL_STRAIN), co.overlap_input(over)
+            value, slopes, curvatures = self._along.at(x)
+            # derivatives by v = log(leading strain): of one input, of log P along it, and, where walls touch,
+            # along the other too
+            share, touch = lead / (lead + SMALL_STRAIN), over > 0
+            by_share = slopes[:, 0] * share
+            slope = 1 + by_share
+            curvature = curvatures[:, 0, 0] * share**2 + by_share * (1 - share)
+            pace = 1.0
+            if touch.any():
+                by_overlap = co.overlap_input_slope(over) * lead
+                closes = by_overlap * over_slope
+                slope += slopes[:, 1] * closes
+                curvature += (2 * curvatures[:, 0, 1] * share + curvatures[:, 1, 1] * closes) * closes
+                curvature += slopes[:, 1] * (by_overlap * lead * over_curvature + closes * (1 - closes))
+                pace = np.maximum(closes, 1)
+            missing = wanted - value - v
+            step = np.minimum(_euler(missing, slope, curvature), last - v)
+            v = v + step
+            moved = np.exp(v) - lead
+            then = over + moved * (over_slope + moved / 2 * over_curvature)
+            found[searched], overlap[searched] = v, then
+            beyond[searched] = missing * ((slope < FLAT) | (v >= last))
+            far = (np.abs(step) * pace > NEAR * np.maximum(slope, FLAT)) | (touch != (then > 0))
+            if not far.any():
+                break
+            searched = np.arange(len(found))[searched][far]
+            x, v, wanted, shape, pressure = (a[far] for a in (x, v, wanted, shape, pressure))
+        lead = np.exp(found)
+        everywhere[:, LEAD], everywhere[:, OVERLAP] = np.log(lead + SMALL_STRAIN), co.overlap_input(overlap)
+        return lead, beyond * (beyond > ABOVE), everywhere
+
+    def strains(self, shape, pressure, level):
+        """(n, 6) free strains."""
+        lead, _, x = self.at(shape, pressure, level)
+        return self.coordinates.strains(shape, lead, self.learned.rest(x))
+
+    def _slopes(self, shape, pressure, level):
+        """(lead (n,), path_inputs x, ratios (n, p - 1), derivatives of what is learned: by the shape numbers
+        and P/mu at a leading strain (n, p, 14), by the leading strain (n, p), d log P/d log(lead) (n,) at
+        least FLAT)."""
+        lead, _, x = self.at(shape, pressure, level)
+        learned, slopes = self.learned(x, derivative=True)
+        over, over_by, over_by_lead = self.closing.overlap_and_slopes(shape, pressure, lead)
+        by_overlap = slopes[:, :, OVERLAP] * self.coordinates.overlap_input_slope(over)[:, None]
+        by = self.coordinates.by_shape(shape, slopes) + by_overlap[:, :, None] * over_by[:, None]
+        by_lead = slopes[:, :, LEAD] / (lead + SMALL_STRAIN)[:, None] + by_overlap * over_by_lead[:, None]
+        return lead, x, learned[:, 1:], by, by_lead, np.maximum(1 + by_lead[:, 0] * lead, FLAT)
+
+    def strains_and_slopes(self, shape, pressure, level):
+        """(strains (n, 6), slopes (n, 6, 14)): derivatives by the 13 shape numbers (the angle in degrees) and
+        P/mu."""
+        lead, _, ratios, by, by_lead, steep = self._slopes(shape, pressure, level)
+        lead_by = -by[:, 0]
+        lead_by[:, -1] += 1 / pressure
+        lead_by *= (lead / steep)[:, None]
+        by[:, 1:] += by_lead[:, 1:, None] * lead_by[:, None]
+        co = self.coordinates
+        return co.strains(shape, lead, ratios), co.strain_slopes(shape, lead, ratios, by[:, 1:], lead_by)
+
+    def spread(self, shape, pressure, level):
+        """(n, 6) standard deviation of the free strains as the Gaussian processes see it, taken as
+        independent."""
+        lead, x, ratios, _, by_lead, steep = self._slopes(shape, pressure, level)
+        deviation = self.learned.deviation(x)
+        of_lead, (first, others), out = (
+            lead * deviation[:, 0] / steep,
+            LEADING[self.kind],
+            np.zeros((len(lead), 6)),
+        )
+        out[:, first] = of_lead
+        with_lead = ratios + by_lead[:, 1:] * lead[:, None]
+        c = np.abs(odd(self.coordinates.strain_parity[1:], cosine(shape)))
+        out[:, others] = c * np.hypot(lead[:, None] * deviation[:, 1:], with_lead * of_lead[:, None])
+        return out
+
+    def deviation(self, x):
+        """(n,) standard deviation of log P at path_inputs (n, d)."""
+        return self.learned.processes[0].deviation(x)[:, 0]
+
+
+def _euler(missing, slope, curvature):
+    """(n,) steps to where slope s + curvature s^2/2 is what is missing, on the branch of positive slope, or
+    to the parabola's top."""
+    inside = slope**2 + 2 * curvature * missing
+    if np.minimum.reduce(slope) > FLAT and np.minimum.reduce(inside) >= 0:
+        return np.minimum(2 * missing / (slope + np.sqrt(inside)), LONGEST)
+    root = np.sqrt(np.maximum(inside, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = np.where(
+            slope > 0,
+            2 * missing / (slope + root),
+            np.where(curvature < 0, (root - slope) / curvature, -LONGEST),
+        )
+        step = np.where((inside < 0) & (curvature < 0), -slope / curvature, step)
+    return np.clip(step, -LONGEST, LONGEST)

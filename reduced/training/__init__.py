@@ -1,0 +1,1 @@
+"""`pneunet train`: the law from a data set, and how well it does."""

@@ -1,0 +1,224 @@
+"""The law of one kind from the states of cells: Gaussian processes for the path of free states and for their
+stiffness, the enthalpy around them, and intervals from the residuals of a cross-validation by design
+(conformal, with the process's deviation as their shape).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pneunet.reduced.trained import gaussian
+from pneunet.reduced.trained.closing import Closing
+from pneunet.reduced.trained.coordinates import Coordinates, cosine, odd
+from pneunet.reduced.trained.enthalpy import fit_anharmonic
+from pneunet.reduced.trained.free_path import FreePath
+from pneunet.reduced.trained.free_stiffness import FreeStiffness, order
+from pneunet.reduced.trained.law import LOWEST, KindLaw
+from pneunet.reduced.trained.side_by_side import fit_side_by_side
+from pneunet.reduced.training.judging import symmetric
+from pneunet.reduced.training.states import folds
+
+#: of the cross-validation that intervals come from
+FOLDS = 10
+INTERVAL = 0.9
+#: the training designs' ranges are widened by this part before a design is outside
+MARGIN = 0.02
+
+#: points that the free states are summed up on, as many as a rod of both kinds may cost in half a
+#: millisecond; those of how walls close; those of the rough process that the search for the leading strain
+#: starts from: within some 3 % of it (measured: median), from where one step is mostly enough; and those of
+#: the stiffness
+INDUCING, CLOSING, ROUGH, OF_STIFFNESS = 1600, 1000, 300, 2200
+#: times the largest leading strain of the training designs: up to there paths of free states are followed
+FURTHEST = 1.2
+#: a deviation above this many times the largest one at the training points, rest included, is outside
+DOUBT = 2.0
+#: step of central differences along directions of shape (degrees, normal pitches): the transformations are
+#: smooth there
+STEP = 1e-4
+
+#: of what is learned (of the strains: the leading one's logarithm) over a standard deviation of the inputs:
+#: above that a state is next to its limit load or walls are just touching, where derivatives grow without
+#: bound. (Those of the stiffness where walls touch are left out altogether; measured: with them its error is
+#: a fifth larger.)
+STEEPEST = 1.0
+#: designs seen to touch that suffice to learn what contact adds to the stiffness; and bounds of its noises:
+#: mesh points come into contact one by one
+TELLING, CONTACT_NOISES = (
+    10,
+    tuple((low, np.log(most)) for (low, _), most in zip(gaussian.LOG_NOISES, (1e-2, 1e-2, 1.0))),
+)
+#: states that the metric of how far walls close is found on: without slopes, and with one output, more cost
+#: little
+MANY = 1200
+#: of the angle, below which derivatives along it are not used
+SMALLEST_COSINE = 0.2
+
+
+def slopes_of(states, known, inputs, outputs, some):
+    """gaussian.Slopes of the states where they are `known` (n, s), among those that are `some` (n,).
+
+    inputs, outputs: functions of (shape, strains, matrices, states) that give what the process sees.
+    """
+    at, way = np.nonzero(known & some[:, None])
+    s, change = (
+        states.of(at),
+        (states.directions[way], states.strain_slopes[at, way], states.matrix_slopes[at, way]),
+    )
+    ends = [
+        [a + sign * STEP * b for a, b in zip((s.shape, s.strains, s.matrices), change)] for sign in (1, -1)
+    ]
+    ways, values = ((f(*ends[0], s) - f(*ends[1], s)) / (2 * STEP) for f in (inputs, outputs))
+    return gaussian.Slopes((np.cumsum(some) - 1)[at], ways, values)
+
+
+def in_deviations(slopes, inputs):
+    """(r, p) Slopes over a standard deviation of the inputs (n, d)."""
+    return slopes.in_units(np.maximum(inputs.std(axis=0), 1e-12)).values
+
+
+def told_by_angle(states):
+    """(n, s) bool: not along the angle near 90 degrees, where what is odd in its cosine is divided by it."""
+    return (np.abs(cosine(states.shape)) > SMALLEST_COSINE)[:, None] | (states.directions[:, 0] == 0)
+
+
+def fit_path(states, like=None, again=False, slopes=True):
+    """The FreePath of the free states; the leading strain has a metric of its own (measured: a quarter off
+    its error)."""
+    states = states.loaded
+    co, closing = Coordinates(states.kind), fit_closing(states, like and like.closing.process, again)
+
+    def inputs(shape, strains, matrices, s):
+        with np.errstate(invalid="ignore"):
+            lead = co.leading(strains)
+            return co.path_inputs(shape, lead, s.level, closing.overlap(shape, s.pressure, lead))
+
+    def outputs(shape, strains, matrices, s):
+        with np.errstate(invalid="ignore"):
+            return co.learned_strains(shape, s.pressure, strains)
+
+    x, y = (
+        inputs(states.shape, states.strains, None, states),
+        outputs(states.shape, states.strains, None, states),
+    )
+    good = np.isfinite(y).all(axis=1)  # the leading strain is larger than 0
+    steep = None
+    if slopes:
+        known = np.isfinite(states.strain_slopes).all(axis=2) & told_by_angle(states)
+        steep = slopes_of(states, known, inputs, outputs, good)
+        steep = steep.of((np.abs(in_deviations(steep, x[good])) < STEEPEST).all(axis=1))
+    learned = fit_strains(states, good, x, y, steep, like and like.learned, again)
+    start = fit_side_by_side(
+        states.inputs[good], -y[good, :1], states.case[good], np.ones((good.sum(), 1)), (1,), inducing=ROUGH
+    )
+    return FreePath(states.kind, closing, learned, start, FURTHEST * float(co.leading(states.strains).max()))
+
+
+def fit_strains(states, good, x, y, slopes=None, like=None, again=False):
+    """SideBySide processes of Coordinates.learned_strains y (n, p) at inputs x (n, d) of the States that are
+    `good` (n,), the leading strain's first; slopes: gaussian.Slopes at those; like, again: as for
+    gaussian.fit."""
+    trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.shape)))
+    settings = {"slopes": slopes, "like": like, "again": again, "inducing": INDUCING}
+    return fit_side_by_side(x[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), **settings)
+
+
+def fit_closing(states, like=None, again=False):
+    """The Closing of free states; like: the process of another one."""
+    if len(np.unique(states.design[states.touching])) < TELLING:
+        return Closing(states.kind, None)
+    states = states.of(np.isfinite(states.closing))
+    co = Coordinates(states.kind)
+    x, y = (
+        co.closing_inputs(states.shape, co.closing_load(states.pressure, co.leading(states.strains))),
+        states.closing[:, None],
+    )
+    settings = {"like": like, "again": again, "most": MANY, "inducing": CLOSING}
+    return Closing(states.kind, fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), **settings))
+
+
+def fit_stiffness(states, closing, like=None, again=False):
+    """The FreeStiffness of free states whose walls close as the Closing says."""
+    co = Coordinates(states.kind)
+    y = co.learned_stiffness(states.shape, states.matrices)
+    good, touching = np.isfinite(y).all(axis=1), states.touching
+    if closing.process is None or len(np.unique(states.design[touching & good])) < TELLING:
+        return FreeStiffness(states.kind, _fit_smooth(states.of(good), like and like.smooth, again), None)
+    smooth = _fit_smooth(states.of(good & ~touching), like and like.smooth, again)
+    states, y = states.of(good & touching), y[good & touching]
+    closed = closing.closed(states.shape, states.pressure, states.strains)
+    added = (y - smooth(co.stiffness_inputs(states.shape, states.strains, states.level)))[:, order(co)]
+    trust, x = (
+        _trust_in_stiffness(states)[:, order(co)],
+        co.contact_inputs(states.shape, states.strains, closed),
+    )
+    settings = {"like": like and like.contact, "again": again, "noises": CONTACT_NOISES}
+    contact = fit_side_by_side(x, added, states.case, trust, (1, added.shape[1] - 1), **settings)
+    return FreeStiffness(states.kind, smooth, contact)
+
+
+def _trust_in_stiffness(states):
+    """(n, p) trust of gaussian.fit in what is learned of the stiffness: what is odd in the angle's cosine was
+    divided by it."""
+    return odd(Coordinates(states.kind).stiffness_parity, np.abs(cosine(states.shape)))
+
+
+def _fit_smooth(states, like, again):
+    """Gaussian process of Coordinates.learned_stiffness, by slopes too where walls do not touch."""
+    co = Coordinates(states.kind)
+
+    def inputs(shape, strains, matrices, s):
+        return co.stiffness_inputs(shape, strains, s.level)
+
+    def outputs(shape, strains, matrices, s):
+        return co.learned_stiffness(shape, matrices)
+
+    x, y = (
+        inputs(states.shape, states.strains, None, states),
+        outputs(states.shape, None, states.matrices, states),
+    )
+    known = (
+        np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states) & ~states.touching[:, None]
+    )
+    steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
+    steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
+    settings = {"like": like, "again": again, "inducing": OF_STIFFNESS}
+    return fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, **settings)
+
+
+def fit_kind(sample, like=None, again=True):
+    """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts,
+    or, unless `again`, which are taken as they are."""
+    states, around = sample.free, sample.around
+    path = fit_path(states, like and like.path, again=again)
+    stiffness = fit_stiffness(states, path.closing, like and like.stiffness, again=again)
+    co = Coordinates(states.kind)
+    closed = path.closing.closed(around.shape, around.pressure, around.strains)
+    x = co.around_inputs(around.shape, around.strains, closed)
+    anharmonic = fit_anharmonic(
+        states.kind, x, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces
+    )
+    x = co.ranged(states.shape, states.pressure, states.level)
+    level = int(states.level.max())
+    doubt = DOUBT * float(
+        path.deviation(path.at(states.shape, np.maximum(states.pressure, LOWEST), level)[-1]).max()
+    )
+    margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
+    low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
+    low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
+    law = KindLaw(states.kind, path, stiffness, anharmonic, np.ones(6), low, high, doubt, level)
+    return replace(law, quantile=_quantiles(law, states.loaded, sample.drawn))
+
+
+def _quantiles(law, states, drawn):
+    """(6,) what deviations are multiplied by for INTERVAL of the cross-validated residuals to lie within.
+    Those of designs that were drawn like the held-out ones, with numbers below `drawn`: the chosen ones are
+    harder, and would widen the intervals."""
+    scores = []
+    for judged in folds(np.unique(states.design[states.design < drawn]), FOLDS):
+        out = np.isin(states.design, judged)
+        path, t = fit_path(states.of(~out), like=law.path), states.of(out)
+        spread = path.spread(t.shape, t.pressure, t.level)
+        miss = np.abs(path.strains(t.shape, t.pressure, t.level) - t.strains)
+        scores.append(np.divide(miss, spread, out=np.zeros_like(miss), where=spread > 0))
+    return np.quantile(np.concatenate(scores), INTERVAL, axis=0)
