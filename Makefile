@@ -7,7 +7,7 @@ RANKS := 2
 export OMP_NUM_THREADS := 1
 export HWLOC_HIDE_ERRORS := 2
 
-.PHONY: help setup demo test bench image image-test clean
+.PHONY: help setup demo test types bench image image-test clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
@@ -20,6 +20,10 @@ demo: setup ## target curve -> design -> CAD -> finite elements -> report
 test: setup ## all tests; those of the finite elements again on 2 ranks
 	$(VENV)/python -m pytest
 	$(VENV)/pneunet run -n $(RANKS) -- python -m pytest -q -p no:cacheprovider tests/hifi tests/verification
+
+types: setup ## mypy and ruff
+	$(VENV)/ruff check . && $(VENV)/ruff format --check .
+	$(VENV)/python -m tests.typecheck
 
 bench: setup ## measure the figures (ONLY=part for one part)
 	$(VENV)/python -m benchmarks $(if $(ONLY),--only $(ONLY))

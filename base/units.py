@@ -1,7 +1,7 @@
 """Consistent units: mm, N, MPa, tonne, s. Files and the command line carry the unit in the key; inside there
 is one system, and these are the factors between the two."""
 
-MPA_PER_KPA = 1e-3
+MPA_PER_KPA, KPA_PER_MPA = 1e-3, 1e3
 TONNE_PER_MM3_PER_KG_PER_M3 = 1e-12
 PER_MM_PER_M = 1e-3  # 1/m -> 1/mm
 GRAVITY = 9810.0  # mm/s^2

@@ -59,7 +59,7 @@ def stiffness_difference(folder, mesh_size=2.0):
 def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
     """Largest relative change when the cut moves (6x6 stiffness) and when the gauge does (what belongs to no
     section frame)."""
-    from pneunet.geometry.cad import body as cad
+    from pneunet.geometry import tags
     from pneunet.geometry.cad.cell import mesh_cell
     from pneunet.hifi.cell.problem import CellProblem
     from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
@@ -81,7 +81,7 @@ def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
         system.destroy()
         return found
 
-    here, cut, walls = state(path), state(other), state(path, (cad.CAVITY,))
+    here, cut, walls = state(path), state(other), state(path, (tags.CAVITY,))
     scale = np.sqrt(np.diag(here.stiffness))
     moved = np.abs((cut.stiffness - here.stiffness) / np.outer(scale, scale)).max()
     frames = np.abs(walls.screw_compliance / here.screw_compliance - 1).max()

@@ -12,7 +12,8 @@ import time
 from pathlib import Path
 
 from pneunet.base.errors import ConvergenceError, InputError
-from pneunet.launch import RANK_VARIABLES, rank_map
+from pneunet.base.system.log import is_rank_0, show_on_screen
+from pneunet.launch import rank_map
 
 
 class Parser(argparse.ArgumentParser):
@@ -410,13 +411,14 @@ def run_doctor(a):
 
 def main(arguments=None):
     """Entry point; returns the exit code."""
+    show_on_screen()
     try:
         a = parser().parse_args(arguments)
         return a.function(a) or 0
     except (InputError, ConvergenceError, MemoryError) as error:
         # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with
         # it what rank 0 still has to say, at the first failure
-        if all(os.environ.get(name, "0") == "0" for name in RANK_VARIABLES):
+        if is_rank_0():
             print(f"pneunet: {error}", file=sys.stderr, flush=True)
         else:
             time.sleep(1.0)

@@ -12,10 +12,9 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+from pneunet.base.system.log import RANK_VARIABLES
 from pneunet.base.system.processes import end_with_parent, environment_without_launcher
 
-#: what MPI launchers tell a process of its rank
-RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 # Variables of Open MPI 4 (OMPI_...) and 5 (PRTE_... for its launcher). A value the user has set wins.
 SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",

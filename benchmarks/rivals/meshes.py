@@ -45,7 +45,7 @@ def arrays(path):
     """What mesh.npz holds, of a gmsh file."""
     import gmsh
 
-    from pneunet.geometry.cad import body as cad
+    from pneunet.geometry import tags
 
     gmsh.initialize()
     try:
@@ -55,7 +55,7 @@ def arrays(path):
         order = np.argsort(tags)
         tets = np.searchsorted(tags[order], gmsh.model.mesh.getElementsByType(4)[1].reshape(-1, 4))
         found = {"points": points.reshape(-1, 3)[order], "tets": tets}
-        for name, tag in (("base", cad.BASE), ("cavity", cad.CAVITY), ("channel", cad.CHANNEL)):
+        for name, tag in (("base", tags.BASE), ("cavity", tags.CAVITY), ("channel", tags.CHANNEL)):
             entities = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
             facets = np.concatenate(
                 [gmsh.model.mesh.getElementsByType(2, e)[1].reshape(-1, 3) for e in entities]

@@ -9,7 +9,7 @@ from ramp import MILESTONES, MPA, MU, Body
 
 from benchmarks.rivals.meshes import segment
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.body.problem import MixedProblem, Support
 from pneunet.hifi.fem import compat
@@ -23,9 +23,9 @@ class OurBody(Body):
 
     def __init__(self, path, comm=MPI.COMM_WORLD):
         super().__init__()
-        self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
+        self.pressure = Pressure((tags.CAVITY, tags.CHANNEL))
         self.problem = MixedProblem(
-            *compat.read_mesh(path, comm), NeoHookean(MU), [Support(cad.BASE)], [self.pressure]
+            *compat.read_mesh(path, comm), NeoHookean(MU), [Support(tags.BASE)], [self.pressure]
         )
         self.dofs, self.speaks = self.problem.dofs, comm.rank == 0
         self.matrix = self.problem.create_tangent()

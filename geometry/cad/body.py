@@ -11,11 +11,7 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-
-#: physical tags of the faces; volumes are tagged BODY + segment index, bottom layers LAYER + segment index
-CAVITY, CHANNEL, BASE, TIP, OUTER = 11, 12, 13, 14, 15
-BODY, LAYER = 100, 300
-FACE_NAMES = {CAVITY: "cavity", CHANNEL: "channel", BASE: "base", TIP: "tip", OUTER: "outer"}
+from pneunet.geometry import tags
 
 _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
 
@@ -166,9 +162,11 @@ def build(manipulator):
             "segment: the cavity breaks through the outer surface: check side_wall, top_wall and"
             " base_thickness"
         )
-    _tag_volumes(BODY, "segment", range(len(manipulator.segments)), set(body_volumes) - set(layer_volumes))
     _tag_volumes(
-        LAYER,
+        tags.BODY, "segment", range(len(manipulator.segments)), set(body_volumes) - set(layer_volumes)
+    )
+    _tag_volumes(
+        tags.LAYER,
         "layer of segment",
         [i for i, s in enumerate(manipulator.segments) if s.layer_thickness],
         layer_volumes,
@@ -197,19 +195,19 @@ def _tag_volumes(first, name, segments, volumes):
 
 
 def _tag_faces(manipulator, body_faces, cavity_faces):
-    groups = {tag: [] for tag in FACE_NAMES}
+    groups = {tag: [] for tag in tags.FACE_NAMES}
     for face in sorted(body_faces):
         x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(2, face)
         if face in cavity_faces:
             i = int(np.clip(np.searchsorted(manipulator.starts, (x0 + x1) / 2) - 1, 0, None))
             s = manipulator.segments[i]
-            groups[CHANNEL if in_channel(s, (x0, y0, z0, x1, y1, z1)) else CAVITY].append(face)
+            groups[tags.CHANNEL if in_channel(s, (x0, y0, z0, x1, y1, z1)) else tags.CAVITY].append(face)
         elif x1 < _TOLERANCE:
-            groups[BASE].append(face)
+            groups[tags.BASE].append(face)
         elif x0 > manipulator.length - _TOLERANCE:
-            groups[TIP].append(face)
+            groups[tags.TIP].append(face)
         else:
-            groups[OUTER].append(face)
+            groups[tags.OUTER].append(face)
     for tag, faces in groups.items():
         gmsh.model.addPhysicalGroup(2, faces, tag)
-        gmsh.model.setPhysicalName(2, tag, FACE_NAMES[tag])
+        gmsh.model.setPhysicalName(2, tag, tags.FACE_NAMES[tag])

@@ -12,9 +12,7 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
 from pneunet.geometry.cad import body as cad
-
-#: physical tags of the air's volume and of the gaps'
-AIR, GAP = 200, 400
+from pneunet.geometry.tags import AIR, GAP
 
 
 def mesh_cell(segment, mesh_size, path, cut=0.0, gaps=False, edge_size=None):
@@ -75,19 +73,19 @@ def _build(segment, half, cut, gaps):
     ends = np.cumsum([len(solids[0]), len(solids[1]), len(layer), len(medium)])
     air, layer, medium = ([t for _, t in sorted(cad.pieces(parents[a:b]))] for a, b in zip(ends, ends[1:]))
     body = sorted({t for _, t in cad.pieces(parents[: len(solids[0])])} - set(air))
-    gmsh.model.addPhysicalGroup(3, sorted(set(body) - set(layer)), cad.BODY)
+    gmsh.model.addPhysicalGroup(3, sorted(set(body) - set(layer)), tags.BODY)
     if layer:
-        gmsh.model.addPhysicalGroup(3, layer, cad.LAYER)
+        gmsh.model.addPhysicalGroup(3, layer, tags.LAYER)
     gmsh.model.addPhysicalGroup(3, air, AIR)
     if medium:
         gmsh.model.addPhysicalGroup(3, medium, GAP)
     _make_periodic(half, s.pitch)
     interface = _boundary(body) & _boundary(air)
     channel = [f for f in interface if cad.in_channel(s, gmsh.model.getBoundingBox(2, f))]
-    gmsh.model.addPhysicalGroup(2, sorted(channel), cad.CHANNEL)
-    gmsh.model.addPhysicalGroup(2, sorted(interface - set(channel)), cad.CAVITY)
+    gmsh.model.addPhysicalGroup(2, sorted(channel), tags.CHANNEL)
+    gmsh.model.addPhysicalGroup(2, sorted(interface - set(channel)), tags.CAVITY)
     outer = [f for f in _boundary(body) - interface if not _on_cut(f, half)]
-    gmsh.model.addPhysicalGroup(2, sorted(outer), cad.OUTER)
+    gmsh.model.addPhysicalGroup(2, sorted(outer), tags.OUTER)
     return body, air
 
 

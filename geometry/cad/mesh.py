@@ -12,6 +12,7 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path, write_text
 from pneunet.base.files.toml import to_table
+from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
 
 
@@ -119,14 +120,14 @@ def open_edges(nodes):
 def _check(volumes):
     """Counts, areas and quality of the current mesh; InputError when the cavity leaks or volumes disagree."""
     positions = _node_positions()
-    facets = {tag: _facet_nodes(tag) for tag in cad.FACE_NAMES}
+    facets = {tag: _facet_nodes(tag) for tag in tags.FACE_NAMES}
     areas = {}
-    for tag, name in cad.FACE_NAMES.items():
+    for tag, name in tags.FACE_NAMES.items():
         xyz = positions[facets[tag]]
         areas[f"{name}_mm2"] = float(
             np.linalg.norm(np.cross(xyz[:, 1] - xyz[:, 0], xyz[:, 2] - xyz[:, 0]), axis=1).sum() / 2
         )
-    cavity = np.concatenate([facets[cad.CAVITY], facets[cad.CHANNEL]])
+    cavity = np.concatenate([facets[tags.CAVITY], facets[tags.CHANNEL]])
     if open_edges(cavity) or open_edges(np.concatenate(list(facets.values()))):
         raise InputError(
             "mesh: the cavity's or the body's surface is not closed: walls touch or cut each other"

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pneunet.base import se3
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.geometry.loading import DeadLoads
 from pneunet.hifi.body.problem import MixedProblem, Support
 from pneunet.hifi.body.system import BodySystem
@@ -80,13 +80,13 @@ class ManipulatorSolve:
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
         if flip_y:
             mesh.geometry.x[:, 1] *= -1
-        materials = {cad.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
+        materials = {tags.BODY + i: s.material for i, s in enumerate(manipulator.segments)}
         materials |= {
-            cad.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness
+            tags.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness
         }
-        self.pressure = Pressure((cad.CAVITY, cad.CHANNEL))
+        self.pressure = Pressure((tags.CAVITY, tags.CHANNEL))
         self.dead = _dead(loads or DeadLoads(), materials)
-        supports = [Support(cad.BASE)] + [Support(cad.TIP)] * hold_tip
+        supports = [Support(tags.BASE)] + [Support(tags.TIP)] * hold_tip
         self.problem = MixedProblem(
             mesh, cell_tags, facet_tags, materials, supports, [self.pressure, *self.dead]
         )
@@ -253,6 +253,6 @@ class ManipulatorSolve:
 def _dead(loads, materials):
     """hifi.fem.loads of the DeadLoads that are not zero."""
     dead = [Gravity(materials, loads.gravity)] if any(loads.gravity) else []
-    return dead + [EndLoad(cad.TIP, loads.tip_force, loads.tip_moment)] * any(
+    return dead + [EndLoad(tags.TIP, loads.tip_force, loads.tip_moment)] * any(
         [*loads.tip_force, *loads.tip_moment]
     )

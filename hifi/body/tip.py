@@ -5,7 +5,7 @@ import numpy as np
 from dolfinx import fem
 
 from pneunet.base.errors import ConvergenceError
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.geometry.loading import DeadLoads
 from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.fem import compat
@@ -45,7 +45,7 @@ def stiffness(solve):
     """run.json's `tip_stiffness`: the inverse of the tip's compliance in its section frame, of a
     ManipulatorSolve; collective."""
     frame = solve.sections.frames()[-1]
-    K = np.linalg.inv(compliance(solve.system, cad.TIP, frame))
+    K = np.linalg.inv(compliance(solve.system, tags.TIP, frame))
     return {
         "pressure_kPa": float(solve.pressure.value.value) * 1e3,
         **solve.measure().touch.marks,
@@ -76,7 +76,7 @@ def blocked_force(manipulator, mesh_path, pressure, loads, comm, contact=None):
         reached = "the pressure asked for"
     except ConvergenceError as error:
         reached = str(error)
-    force, moment = held.problem.reaction(cad.TIP, [manipulator.length, 0.0, 0.0])
+    force, moment = held.problem.reaction(tags.TIP, [manipulator.length, 0.0, 0.0])
     measured = held.measure()
     held.destroy()
     return {

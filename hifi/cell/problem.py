@@ -19,8 +19,8 @@ from petsc4py import PETSc
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pneunet.geometry.cad import body as cad
-from pneunet.geometry.cad.cell import AIR, GAP
+from pneunet.geometry import tags
+from pneunet.geometry.tags import AIR, GAP
 from pneunet.hifi.contact.cell import CellContact
 from pneunet.hifi.contact.walls import CellWalls
 from pneunet.hifi.fem import compat, surface
@@ -49,7 +49,7 @@ class CellProblem:
     """
 
     def __init__(
-        self, segment, mesh, gauge=(cad.CHANNEL,), centre=0.0, rollers=None, medium=None, contact=None
+        self, segment, mesh, gauge=(tags.CHANNEL,), centre=0.0, rollers=None, medium=None, contact=None
     ):
         self.segment, comm, self._gauge_of, self._penalty = segment, MPI.COMM_SELF, (gauge, centre), contact
         self.mesh, self.cell_tags, self.facet_tags = (
@@ -71,7 +71,7 @@ class CellProblem:
         self._reduce(rollers or {})
         self._place()
         self.stretch = PrincipalStretch(
-            self, self.cell_tags.indices[np.isin(self.cell_tags.values, (cad.BODY, cad.LAYER))]
+            self, self.cell_tags.indices[np.isin(self.cell_tags.values, (tags.BODY, tags.LAYER))]
         )
 
     def _place(self):
@@ -102,7 +102,7 @@ class CellProblem:
         dx = ufl.Measure(
             "dx", domain=mesh, subdomain_data=self.cell_tags, metadata={"quadrature_degree": DEGREE}
         )
-        solid, air = dx(cad.BODY), dx(AIR)
+        solid, air = dx(tags.BODY), dx(AIR)
         q = ufl.variable(self.strains)
         u, p = ufl.split(self.state)
         v = ufl.TestFunction(self.space)
@@ -119,7 +119,7 @@ class CellProblem:
         energies = (
             (energy_density(mesh, material, F, p), solid),
             *(
-                (energy_density(mesh, m, F, p), dx(cad.LAYER))
+                (energy_density(mesh, m, F, p), dx(tags.LAYER))
                 for m in [self.segment.layer_material]
                 if m is not None
             ),

@@ -3,8 +3,8 @@
 import ufl
 from dolfinx import fem
 
-from pneunet.geometry.cad import body as cad
-from pneunet.geometry.cad.cell import AIR
+from pneunet.geometry import tags
+from pneunet.geometry.tags import AIR
 from pneunet.hifi.cell.problem import AIR_STIFFNESS, DEGREE
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.materials import energy_density
@@ -22,7 +22,7 @@ class StoredEnergy:
         _, p = ufl.split(problem.state)
         air = AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * ufl.det(F))
         self._contact = problem.contact
-        self._form = compat.compile_form(energy_density(mesh, material, F, p) * dx(cad.BODY) + air * dx(AIR))
+        self._form = compat.compile_form(energy_density(mesh, material, F, p) * dx(tags.BODY) + air * dx(AIR))
 
     def value(self):
         return float(fem.assemble_scalar(self._form)) + (self._contact.energy() if self._contact else 0.0)

@@ -15,7 +15,7 @@ node trees.
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.hifi.contact.walls import distances_from
 from pneunet.hifi.fem import surface
 
@@ -41,7 +41,7 @@ class BodyDistance:
         heights = [s.chamber_top - min(s.core_bottom, s.chamber_bottom) for s in manipulator.segments]
         self.diameter = max(float(np.hypot(s.width, h)) for s, h in zip(manipulator.segments, heights))
         self.apart = max(self.diameter, *(s.pitch for s in manipulator.segments))
-        self._local = surface.facet_nodes(problem, cad.OUTER, cad.TIP, cad.BASE)
+        self._local = surface.facet_nodes(problem, tags.OUTER, tags.TIP, tags.BASE)
         X = self._gather(problem.nodes)
         if self.comm.rank == 0:
             self._arrange(X)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.hifi.contact.walls import CellWalls, distances_from
 from pneunet.hifi.fem import surface
 
@@ -27,7 +27,7 @@ def draw_cell(problem, state, path, pitches=PITCHES):
         distances = node_distances(CellWalls(problem), state.array)
     finally:
         problem.strains.value[:] = kept
-    facets = surface.facet_nodes(problem, cad.OUTER)
+    facets = surface.facet_nodes(problem, tags.OUTER)
     of_facets = distances[facets]
     facing = np.isfinite(of_facets).all(axis=1)
     if not facing.any():

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pneunet.base import se3
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.hifi.fem import surface
 
 _TOLERANCE = 1e-6
@@ -44,7 +44,7 @@ class WallDistances:
 
     def __init__(self, problem, manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
-        facets = surface.facet_nodes(problem, cad.OUTER)
+        facets = surface.facet_nodes(problem, tags.OUTER)
         corners = problem.nodes[facets[:, :3]]
         self.facets, wall_of_facet, self.gaps = [], [], []
         wall = 0
@@ -114,7 +114,7 @@ class CellWalls:
 
     def __init__(self, problem):
         self.problem, s = problem, problem.segment
-        facets = surface.facet_nodes(problem, cad.OUTER)
+        facets = surface.facet_nodes(problem, tags.OUTER)
         corners = problem.nodes[facets[:, :3]]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         slope = normal[:, 0] / np.linalg.norm(normal, axis=1)

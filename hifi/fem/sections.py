@@ -6,7 +6,7 @@ from mpi4py import MPI
 from pneunet.base import se3
 from pneunet.base.frames import FitMoments, frame_at
 from pneunet.base.strains import RodStrains
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.hifi.fem import surface
 
 
@@ -21,7 +21,7 @@ class SectionFrames:
     def __init__(self, problem, manipulator):
         self.problem, self.manipulator = problem, manipulator
         self.comm = problem.mesh.comm
-        wall = surface.facet_nodes(problem, cad.CHANNEL)
+        wall = surface.facet_nodes(problem, tags.CHANNEL)
         windows, self.segment_stations = [], []
         for segment, start in zip(manipulator.segments, manipulator.starts):
             s = np.arange(2 * segment.chambers - 1) * segment.pitch / 2 + start + segment.chamber_positions[0]
@@ -34,7 +34,7 @@ class SectionFrames:
         self._integrals = [
             surface.SlabIntegral(problem, wall, s - pitch / 2, s + pitch / 2) for s, pitch in windows
         ]
-        self._integrals.append(surface.SlabIntegral(problem, surface.facet_nodes(problem, cad.TIP)))
+        self._integrals.append(surface.SlabIntegral(problem, surface.facet_nodes(problem, tags.TIP)))
         self.stations = np.array([0.0] + [s for s, _ in windows] + [manipulator.length])
 
     def frames(self, array=None):

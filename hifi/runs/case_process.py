@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import write_text
+from pneunet.base.system.log import show_on_screen
 
 #: name of a case's function, which its folder is named by, -> where that function is. Names stay as they were
 #: first given, so that moving a module loses no finished case; another name is a place itself, "module:name".
@@ -38,6 +39,7 @@ def answer(function, inputs, directory):
 
 
 def main(directory):
+    show_on_screen()  # into the case's log.txt
     directory = Path(directory)
     case = json.loads((directory / "case.json").read_text())
     found = answer(case["function"], case["inputs"], directory)

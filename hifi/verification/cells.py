@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.path.control import LoadControl
@@ -44,7 +44,7 @@ def held_at(problem, held, strains):
 def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
     """Torque and axial force of the cylinder as a cell; the gauge is its whole mantle."""
     problem = CellProblem(
-        Solid(1.0, 2.0), bodies.round_body(folder, "cylinder", size, cad.BODY), (bodies.OUTER,), centre=0.5
+        Solid(1.0, 2.0), bodies.round_body(folder, "cylinder", size, tags.BODY), (bodies.OUTER,), centre=0.5
     )
     state = held_at(problem, np.ones(6, bool), np.array([stretch, 0, 0, twist, 0, 0]))
     torque, axial = closed_forms.torsion(stretch, twist)
@@ -59,7 +59,7 @@ def flexure(cells=(2, 16), pitch=0.2, thickness=0.07):
     """Moments of the block as a cell, its stretch free; rollers on its sides, the gauge on its top and
     bottom."""
     box = bodies.box(
-        (pitch, thickness, 1.0), (cells[0], 1, cells[1]), lambda X: X - [0, thickness / 2, 0.5], cad.BODY
+        (pitch, thickness, 1.0), (cells[0], 1, cells[1]), lambda X: X - [0, thickness / 2, 0.5], tags.BODY
     )
     sides = {bodies.PLANE_Y: 1, bodies.END_Y: 1}
     problem = CellProblem(

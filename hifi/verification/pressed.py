@@ -13,7 +13,7 @@ from dolfinx.mesh import meshtags
 from scipy.optimize import brentq
 
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.verification import bodies
@@ -55,9 +55,9 @@ def exact_force(row, stretch, law):
 def pressed(folder, size=0.35, stretch=0.8, twist=0.25):
     """(Comparison of the axial force, torque in N mm, CellState)."""
     row, penalty = Row(), WallPenalty()
-    mesh, cells, facets = bodies.round_body(folder, "cylinder", size, cad.BODY)
+    mesh, cells, facets = bodies.round_body(folder, "cylinder", size, tags.BODY)
     ends = np.isin(facets.values, (bodies.PLANE_X, bodies.END))
-    facets = meshtags(mesh, 2, facets.indices, np.where(ends, cad.OUTER, facets.values).astype(np.int32))
+    facets = meshtags(mesh, 2, facets.indices, np.where(ends, tags.OUTER, facets.values).astype(np.int32))
     problem = CellProblem(row, (mesh, cells, facets), (bodies.OUTER,), centre=0.5, contact=penalty)
     state = held_at(problem, np.ones(6, bool), np.array([stretch, 0, 0, twist, 0, 0]))
     told = (

@@ -5,7 +5,7 @@ import gmsh
 import numpy as np
 
 from pneunet.geometry.cad import body as cad
-from pneunet.geometry.cad.cell import AIR
+from pneunet.geometry.tags import AIR
 
 
 def recut(path, other, pitch, beyond):

@@ -14,7 +14,7 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry import Manipulator, Segment, tags
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.reference_cases import CASES
 
@@ -126,9 +126,9 @@ def test_a_bottom_layer_is_a_volume_of_its_own_and_changes_no_other():
             tag: sum(gmsh.model.occ.getMass(3, v) for v in gmsh.model.getEntitiesForPhysicalGroup(3, tag))
             for _, tag in gmsh.model.getPhysicalGroups(3)
         }
-    for tag, s in ((cad.LAYER, segments[0]), (cad.LAYER + 2, segments[2])):
+    for tag, s in ((tags.LAYER, segments[0]), (tags.LAYER + 2, segments[2])):
         assert parts[tag] == pytest.approx(s.length * s.width * s.layer_thickness)
-    assert sorted(parts) == [cad.BODY, cad.BODY + 1, cad.BODY + 2, cad.LAYER, cad.LAYER + 2]
+    assert sorted(parts) == [tags.BODY, tags.BODY + 1, tags.BODY + 2, tags.LAYER, tags.LAYER + 2]
     assert sum(parts.values()) == pytest.approx(volumes["body_mm3"])
     assert (volumes["body_mm3"], volumes["cavity_mm3"]) == pytest.approx(built(*plain))
 

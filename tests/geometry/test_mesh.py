@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
-from pneunet.geometry import Manipulator, Segment
+from pneunet.geometry import Manipulator, Segment, tags
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad import mesh
 
@@ -50,10 +50,10 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
     first, last = BOTH.segments
     with cad.session():
         gmsh.merge(str(folder / "manipulator.msh"))
-        assert facets(cad.BASE)[..., 0] == pytest.approx(0.0, abs=1e-9)
-        assert facets(cad.TIP)[..., 0] == pytest.approx(BOTH.length)
-        cavity = np.concatenate([facets(cad.CAVITY), facets(cad.CHANNEL)])
-        channel = facets(cad.CHANNEL)
+        assert facets(tags.BASE)[..., 0] == pytest.approx(0.0, abs=1e-9)
+        assert facets(tags.TIP)[..., 0] == pytest.approx(BOTH.length)
+        cavity = np.concatenate([facets(tags.CAVITY), facets(tags.CHANNEL)])
+        channel = facets(tags.CHANNEL)
         volumes = gmsh.model.getPhysicalGroups(3)
     # the divergence theorem on the tagged surface gives the CAD's cavity volume: it is all there, and closed
     normals = np.cross(cavity[:, 1] - cavity[:, 0], cavity[:, 2] - cavity[:, 0]) / 2
@@ -67,7 +67,7 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
     assert np.ptp(z[~on_side], axis=1) == pytest.approx(0.0, abs=1e-9)
     ends = first.chamber_positions[0] - first.pitch / 2, BOTH.length - last.end_wall
     assert (x.min(), x.max()) == pytest.approx(ends)
-    assert volumes == [(3, cad.BODY), (3, cad.BODY + 1)]
+    assert volumes == [(3, tags.BODY), (3, tags.BODY + 1)]
 
 
 def test_the_same_mesh_again(meshed, tmp_path):

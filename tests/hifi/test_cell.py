@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import tags
 from pneunet.geometry.cad.cell import mesh_cell
 from pneunet.geometry.reference_cases import CASES
 from pneunet.hifi.cell.file import CellCase
@@ -129,7 +129,7 @@ def test_what_no_section_frame_can_change(one_sided, tmp_path):
     are the body's own."""
     mesh_cell(one_sided, 3.0, tmp_path / "cell.msh")
     state, other = (
-        at_gauge(one_sided, tmp_path / "cell.msh", gauge=g) for g in ((cad.CHANNEL,), (cad.CAVITY,))
+        at_gauge(one_sided, tmp_path / "cell.msh", gauge=g) for g in ((tags.CHANNEL,), (tags.CAVITY,))
     )
     assert abs(other.strains.e[1] - state.strains.e[1]) > 0.01
     assert np.linalg.norm(other.strains.k) == pytest.approx(np.linalg.norm(state.strains.k), rel=1e-7)

@@ -8,8 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from pneunet.base import se3
-from pneunet.geometry import Manipulator, Segment
-from pneunet.geometry.cad import body as cad
+from pneunet.geometry import Manipulator, Segment, tags
 from pneunet.geometry.cad.mesh import mesh_manipulator
 from pneunet.geometry.loading import DeadLoads
 from pneunet.hifi.body import tip
@@ -72,7 +71,7 @@ def test_stiffness_of_an_inflated_body_is_the_slope_under_real_tip_loads(finger)
         face.append(
             (
                 loaded.sections.frames()[-1],
-                FaceQuadrature(problem, cad.TIP).moments(problem.nodes + problem.displacement())[1],
+                FaceQuadrature(problem, tags.TIP).moments(problem.nodes + problem.displacement())[1],
             )
         )
         loaded.destroy()
@@ -97,7 +96,7 @@ def test_a_held_tip_is_pushed_by_pressure_and_gravity(finger):
     assert held.sections.frames()[-1] == pytest.approx(
         se3.make_pose(np.eye(3), [manipulator.length, 0, 0]), abs=1e-9
     )
-    at_base, at_tip = (held.problem.reaction(tag)[0] for tag in (cad.BASE, cad.TIP))
+    at_base, at_tip = (held.problem.reaction(tag)[0] for tag in (tags.BASE, tags.TIP))
     held.destroy()
     volume = json.loads((path.parent / "mesh.json").read_text())["body_mm3"]
     assert -(at_base + at_tip) == pytest.approx(1.07e-9 * volume * np.array(gravity), rel=1e-5, abs=1e-7)
