@@ -61,13 +61,13 @@ def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
     section frame)."""
     from pneunet.geometry import tags
     from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.geometry.cad.recut import recut
     from pneunet.hifi.cell.problem import CellProblem
     from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
     from pneunet.hifi.path.control import LoadControl
     from pneunet.hifi.path.equilibrium import EquilibriumPath
     from pneunet.hifi.path.newton import NewtonOptions
     from pneunet.hifi.path.stepping import StepSize, run_steps
-    from pneunet.hifi.verification.recut import recut
 
     segment, path, other = case(mesh_size).segment, Path(folder) / "cell.msh", Path(folder) / "recut.msh"
     mesh_cell(segment, mesh_size, path)

@@ -27,7 +27,8 @@ def setup():
 
 
 def ranks():
-    """Largest relative difference between 1 and 2 ranks over the numbers of hifi/verification/reference_case.py."""
+    """Largest relative difference between 1 and 2 ranks over the numbers of
+    hifi/verification/reference_case.py."""
     from pneunet.hifi.verification import reference_case
 
     with tempfile.TemporaryDirectory() as folder:

@@ -187,8 +187,8 @@ def paper_tubes():
 
 
 def printed():
-    """What reduced.analytic.printed finds: the largest twist with the printed constants, and the printed equations'
-    least residuals."""
+    """What reduced.analytic.printed finds: the largest twist with the printed constants, and the printed
+    equations' least residuals."""
     from pneunet.reduced.analytic.printed import MULTIPLIERS, largest_twist, printed_equations
     from pneunet.reduced.analytic.twisting import PAPER_FIBRE_MODULUS, PAPER_MU, TwistingTube
 

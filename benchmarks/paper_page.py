@@ -64,11 +64,11 @@ The paper's numbers: tau is at most {paper_tau:g} rad/mm (also printed as 0.0325
 together: with a falling slope tau at {paper_angle:g} degrees and 50 kPa is less than five times that at
 10 kPa, 0.0315 at most. Tubes (axial, mu = 0.317 MPa) made as large as it takes to reach {paper_tau:g}:"""
 PRINTED = """\
-The printed constants and equations (`python -m reduced.analytic.printed`; Ri = 3, Ro = 7 mm): with E_t = 0.008 MPa
-the consistent tube twists by at most {largest:.2g} rad/mm at any angle and pressure below its limit load,
-a {share:.0f}th of the paper's figure. With the radii of our cases it is a median {printed} off, beyond
-its limit load in {lost:.0f} % of the states. The printed equations have no solution (relative residual at
-least {unknown:.2g}, or {pressure:.2g} if their P is taken for the pressure)."""
+The printed constants and equations (`python -m reduced.analytic.printed`; Ri = 3, Ro = 7 mm): with E_t =
+0.008 MPa the consistent tube twists by at most {largest:.2g} rad/mm at any angle and pressure below its
+limit load, a {share:.0f}th of the paper's figure. With the radii of our cases it is a median {printed}
+off, beyond its limit load in {lost:.0f} % of the states. The printed equations have no solution (relative
+residual at least {unknown:.2g}, or {pressure:.2g} if their P is taken for the pressure)."""
 HELIX = """\
 Chambers that open across themselves alone bend an oblique strip: k1/k2 = cot(theta), hence P_t kappa_h =
 2 pi cot(theta) (the paper's kappa_h is 1 over the radius of the helix's cylinder, P_t its pitch). The

@@ -1,4 +1,5 @@
-"""`python -m tests.typecheck [FOLDER ...]`: mypy on base, geometry, reduced, design and pneunet, or on some of them.
+"""`python -m tests.typecheck [FOLDER ...]`: mypy on base, geometry, reduced, design and pneunet, or on some
+of them.
 
 mypy follows folders, not setuptools' package-dir mapping: out/types gets links that look as the wheel does.
 """

@@ -21,8 +21,8 @@ def draw_walls(path, body, edges, walls, gap, title, touching=0.0, view=None):
     """Write the picture; pyvista meshes in mm, `walls` with point data FIELD.
 
     The colours are centred on touching walls and reach as far as the gap at rest (mm), or as the deepest
-    overlap. A black line surrounds where the distance is below `touching` (mm). view: base.pictures.rendering.View, by
-    default one that holds the body.
+    overlap. A black line surrounds where the distance is below `touching` (mm). view:
+    base.pictures.rendering.View, by default one that holds the body.
     """
     distances = np.asarray(walls.point_data[FIELD])
     reach = max(gap, -float(distances.min()))

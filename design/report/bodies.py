@@ -1,5 +1,5 @@
-"""Bodies to render: the reduced model's, the finite elements', curves as tubes (base.pictures.rendering makes pictures
-of them)."""
+"""Bodies to render: the reduced model's, the finite elements', curves as tubes (base.pictures.rendering makes
+pictures of them)."""
 
 import numpy as np
 

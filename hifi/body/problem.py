@@ -1,8 +1,8 @@
 """The mixed u-p boundary value problem: unknowns, residual, tangent.
 
-psi = W(F) + p (J - 1) - p^2/(2K) with Taylor-Hood P2/P1, plus the loads' terms (hifi.fem.loads). Volume forms are
-integrated with degree 4 and pressure facets with degree 4, which is exact for the latter on straight-sided
-cells, so that the tangent of the pressure in a closed cavity is symmetric.
+psi = W(F) + p (J - 1) - p^2/(2K) with Taylor-Hood P2/P1, plus the loads' terms (hifi.fem.loads). Volume forms
+are integrated with degree 4 and pressure facets with degree 4, which is exact for the latter on
+straight-sided cells, so that the tangent of the pressure in a closed cavity is symmetric.
 """
 
 from collections.abc import Callable
@@ -36,9 +36,9 @@ class Support:
 class MixedProblem:
     """A body, its materials, its clamps and its loads.
 
-    mesh, cell_tags, facet_tags: as dolfinx gives them. materials: {cell tag: base.materials.laws law}, or one law.
-    supports: list of `Support`. loads: list of hifi.fem.loads objects; the first closed `Pressure` is the cavity
-    whose volume is measured. body_force(X) -> UFL vector in N/mm3, for manufactured solutions.
+    mesh, cell_tags, facet_tags: as dolfinx gives them. materials: {cell tag: base.materials.laws law}, or one
+    law. supports: list of `Support`. loads: list of hifi.fem.loads objects; the first closed `Pressure` is
+    the cavity whose volume is measured. body_force(X) -> UFL vector in N/mm3, for manufactured solutions.
     """
 
     def __init__(self, mesh, cell_tags, facet_tags, materials, supports, loads=(), body_force=None):

@@ -37,15 +37,15 @@ _PLACED = ("segment", "nodes", "gauge", "gauge_strains", "walls", "contact", "_b
 
 
 class CellProblem:
-    """Unknowns, residual and tangent of the cell of `segment`; mesh: path of geometry.cad.cell.mesh_cell's, or
-    the mesh and its tags.
+    """Unknowns, residual and tangent of the cell of `segment`; mesh: path of geometry.cad.cell.mesh_cell's,
+    or the mesh and its tags.
 
     Any pitch of the periodic body will do, whatever its cut's place or shape, and any object with a pitch, a
     width, a material and a layer_material serves as segment. gauge: tags of the facets whose rigid fit is the
     section frame; centre: X1 (mm) where that frame sits, in the middle of the pitch over which it is fitted.
-    rollers: {facet tag: component of u that is zero}. contact: the hifi.contact.penalty.WallPenalty between the
-    walls of the gaps. medium: or a hifi.contact.medium.ThirdMedium that fills the gaps, which must be meshed then;
-    without it, meshed gaps are void.
+    rollers: {facet tag: component of u that is zero}. contact: the hifi.contact.penalty.WallPenalty between
+    the walls of the gaps. medium: or a hifi.contact.medium.ThirdMedium that fills the gaps, which must be
+    meshed then; without it, meshed gaps are void.
     """
 
     def __init__(

@@ -39,9 +39,9 @@ def solve_cell(
     """Mesh and solve a CellCase; `on_state(CellState)` sees every recorded level. Returns (last CellState,
     mesh facts).
 
-    on_limit_point(hifi.path.equilibrium.LimitPoint): told when the pressure has passed one. on_touch(pressure): told the
-    pressure (MPa) of first touch, once, before the first state beyond it. ConvergenceError when the path ends
-    short; what was recorded before has been seen by `on_state`.
+    on_limit_point(hifi.path.equilibrium.LimitPoint): told when the pressure has passed one.
+    on_touch(pressure): told the pressure (MPa) of first touch, once, before the first state beyond it.
+    ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
     """
     edge_size = case.mesh_size * EDGE if case.graded else None
     medium = case.medium if case.contact == "third-medium" else None

@@ -1,8 +1,8 @@
 """Derivatives of a cell's free states by its shape: of the strains and of the stiffness, along
 geometry.shape_numbers.DIRECTIONS.
 
-The mesh moves with the shape (geometry.cad.morph), so that its own error hardly enters. At a free state R(x, q;
-s) = 0, x the unknowns and multipliers and q the strains; the residual and the second derivatives are
+The mesh moves with the shape (geometry.cad.morph), so that its own error hardly enters. At a free state R(x,
+q; s) = 0, x the unknowns and multipliers and q the strains; the residual and the second derivatives are
 differenced along s, all the rest is solved exactly with the tangent that is factorised there (direct
 sensitivity analysis; e.g. Choi & Kim, Structural Sensitivity Analysis, 2005):
     dq = -C^-1 (R_q' - A^T R_x'),  dx = -K^-1 R_x' - A dq,  A = K^-1 R_xq,  C = R_qq - R_xq^T A

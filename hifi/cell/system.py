@@ -25,9 +25,9 @@ class CellState:
     in MPa; unstable: directions in which the cell is unstable at this pressure (its free strains included).
     wall_distance: smallest signed distance (mm) of neighbouring chambers' walls, `gap` that at rest;
     walls_overlap: it is negative and there was no contact model, or one that has failed to hold them apart.
-    contact: hifi.contact.walls.WallContact of the gap with the largest force, None without contact. array: the mixed
-    state of the problem (hifi.cell.problem), what pictures and checks are made of. steps, factorisations in them and
-    seconds: what it took to come here from rest (hifi.cell.run).
+    contact: hifi.contact.walls.WallContact of the gap with the largest force, None without contact. array:
+    the mixed state of the problem (hifi.cell.problem), what pictures and checks are made of. steps,
+    factorisations in them and seconds: what it took to come here from rest (hifi.cell.run).
     """
 
     pressure: float

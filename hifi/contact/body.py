@@ -19,8 +19,8 @@ from pneunet.hifi.path.low_rank import TouchingSides
 
 
 class BodyContact:
-    """Contact in the gaps of `walls` (hifi.contact.walls.WallDistances); laws, gaps: for each of them its PenaltyLaw
-    and width at rest (mm)."""
+    """Contact in the gaps of `walls` (hifi.contact.walls.WallDistances); laws, gaps: for each of them its
+    PenaltyLaw and width at rest (mm)."""
 
     def __init__(self, problem, walls, laws, gaps):
         self.problem, self.comm, self._facets = problem, problem.mesh.comm, walls.facets

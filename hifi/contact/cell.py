@@ -1,5 +1,5 @@
-"""Contact of a unit cell's walls: hifi.contact.penalty between the pieces that the cell's cuts leave, moved by
-the strains (e, k).
+"""Contact of a unit cell's walls: hifi.contact.penalty between the pieces that the cell's cuts leave, moved
+by the strains (e, k).
 
 Each gap is seen from the section frame in its middle, in which a wall's node of local position y at the
 distance s along the axis lies at exp(s (k, e)) y: linear in y, and its derivatives by the strains are exact
@@ -23,7 +23,8 @@ _ORDER = [3, 4, 5, 0, 1, 2]
 
 
 class CellContact:
-    """Contact in the gaps of `walls` (hifi.contact.walls.CellWalls) under a hifi.contact.penalty.WallPenalty."""
+    """Contact in the gaps of `walls` (hifi.contact.walls.CellWalls) under a
+    hifi.contact.penalty.WallPenalty."""
 
     def __init__(self, problem, walls, penalty):
         self.problem, segment = problem, problem.segment

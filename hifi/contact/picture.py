@@ -13,8 +13,8 @@ KPA = 1e3
 
 
 def draw_cell(problem, state, path, pitches=PITCHES):
-    """Write the picture of a hifi.cell.system.CellState of a hifi.cell.problem.CellProblem to `path` (PNG); False
-    without gaps.
+    """Write the picture of a hifi.cell.system.CellState of a hifi.cell.problem.CellProblem to `path` (PNG);
+    False without gaps.
 
     The problem's own state is as before. Needs pyvista and matplotlib.
     """

@@ -1,10 +1,10 @@
 """Do parts of a body run into each other? What a state says about it, and the load at which a path met it
 first.
 
-Two kinds: the facing *walls* of neighbouring chambers (hifi.contact.walls), which a run with a contact model keeps
-apart, and *the body* itself: coils or segments that are far apart along it (hifi.contact.body_distance), which no run
-models. A state beyond first touch is marked for good: what came out of an overlap is not trusted again when
-the distance grows.
+Two kinds: the facing *walls* of neighbouring chambers (hifi.contact.walls), which a run with a contact model
+keeps apart, and *the body* itself: coils or segments that are far apart along it
+(hifi.contact.body_distance), which no run models. A state beyond first touch is marked for good: what came
+out of an overlap is not trusted again when the distance grows.
 """
 
 from dataclasses import dataclass

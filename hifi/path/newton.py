@@ -1,7 +1,7 @@
 """Newton's method with a lagged tangent and secant acceleration, for any system and any control.
 
-A *system* (hifi.body.system, hifi.cell.system) has a state (an array), a scalar `load` (pressure, a fraction of
-gravity, ...), and
+A *system* (hifi.body.system, hifi.cell.system) has a state (an array), a scalar `load` (pressure, a fraction
+of gravity, ...), and
     residual() -> ((n,) array, scale)     what must vanish, and the norm of the forces it balances
     load_gradient() -> (n,)               d residual / d load
     factorise(), solve((n,)) -> (n,)      the tangent at the current state; K^-1 times an array, K possibly an
@@ -13,8 +13,8 @@ gravity, ...), and
                                           now (hifi.path.low_rank);
                                           how deep they overlap at the last residual, over what a correction
                                           may make of it
-A *control* (hifi.path.control) closes the equations for the load. Between factorisations, steps are corrected by
-the secants seen so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear
+A *control* (hifi.path.control) closes the equations for the load. Between factorisations, steps are corrected
+by the secants seen so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear
 Algebra Appl. 16, 2009): the residual that the past increments explain is removed before the lagged tangent
 sees the rest. One solve and one residual an iteration. On slender bodies a lagged tangent is no help once
 walls have bulged, however small the step. What it makes worse is taken back, which costs a solve, and the

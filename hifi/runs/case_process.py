@@ -1,5 +1,5 @@
-"""The process of one case, `python -m pneunet.hifi.runs.case_process DIRECTORY`: reads case.json, calls its function,
-writes answer.json."""
+"""The process of one case, `python -m pneunet.hifi.runs.case_process DIRECTORY`: reads case.json, calls its
+function, writes answer.json."""
 
 import importlib
 import json

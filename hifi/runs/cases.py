@@ -45,8 +45,8 @@ LOCK_SECONDS = 5
 
 @dataclass(frozen=True)
 class Case:
-    """`function` (a name in case_process.FUNCTIONS) will be called as function(inputs, directory) and returns what JSON can
-    hold, or None.
+    """`function` (a name in case_process.FUNCTIONS) will be called as function(inputs, directory) and returns
+    what JSON can hold, or None.
 
     It raises ConvergenceError where its path ends, InputError on inputs it refuses. label: what progress
     calls it.

@@ -1,4 +1,5 @@
-"""One FE case on a shipped mesh: `python -m pneunet.hifi.verification.reference_case OUT.json`, on any number of ranks.
+"""One FE case on a shipped mesh: `python -m pneunet.hifi.verification.reference_case OUT.json`, on any number
+of ranks.
 
 Its numbers must be the same on one and two ranks, on Debian 12 and 13, natively and in the container.
 """

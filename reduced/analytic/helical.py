@@ -34,8 +34,8 @@ def _gauss(low, high, n=GAUSS_POINTS):
 class HelicalCell:
     """Potential energy of one cell of a one-sided Segment; `strains` follows its minimum from P = 0.
 
-    Every argument of a law (reduced/analytic/energies.py) is linear in the unknowns, `rows @ x`: gradient and Hessian are
-    exact.
+    Every argument of a law (reduced/analytic/energies.py) is linear in the unknowns, `rows @ x`: gradient and
+    Hessian are exact.
     """
 
     name = "one-sided cell"

@@ -1,8 +1,9 @@
 """The paper's twisting equations as printed (Eqs 5-21), and what its printed constants give.
 
-`/usr/bin/python3 -m reduced.analytic.printed` prints both. The equations have no solution: with uniform lambda_psi =
-lambda_z^-1/2 and a constant multiplier the three conditions contradict one another, and without c1 mu
-lambda_psi^2 in Eq. 11 not even P = 0 leaves the tube at rest. The consistent form is reduced/analytic/twisting.py.
+`/usr/bin/python3 -m reduced.analytic.printed` prints both. The equations have no solution: with uniform
+lambda_psi = lambda_z^-1/2 and a constant multiplier the three conditions contradict one another, and without
+c1 mu lambda_psi^2 in Eq. 11 not even P = 0 leaves the tube at rest. The consistent form is
+reduced/analytic/twisting.py.
 """
 
 from dataclasses import dataclass

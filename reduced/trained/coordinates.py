@@ -1,12 +1,12 @@
 """What a trained law learns instead of strains and stiffness: smooth numbers of order one that keep the
 body's symmetries.
 
-All without dimension (base.files.dataset): pressure P/mu, strains q = (e, k l). With c = cos(angle), mirror images
-have opposite c, and every quantity is even or odd in c: e2, k1 and k3 change sign in the mirror. Odd ones are
-c times an even function, which is learned as a function of c^2 and the logarithms of the lengths: what makes
-a design soft is a product of powers. The free strains are led by the one that never vanishes, the curvature
-k2 of a one-sided, the stretch of a twisting segment; the others are divided by it. The stiffness is L D L^T
-by the blocks that the half turns of the body leave: unit lower triangular L and log D.
+All without dimension (base.files.dataset): pressure P/mu, strains q = (e, k l). With c = cos(angle), mirror
+images have opposite c, and every quantity is even or odd in c: e2, k1 and k3 change sign in the mirror. Odd
+ones are c times an even function, which is learned as a function of c^2 and the logarithms of the lengths:
+what makes a design soft is a product of powers. The free strains are led by the one that never vanishes, the
+curvature k2 of a one-sided, the stretch of a twisting segment; the others are divided by it. The stiffness is
+L D L^T by the blocks that the half turns of the body leave: unit lower triangular L and log D.
 """
 
 from dataclasses import dataclass

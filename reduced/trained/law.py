@@ -93,8 +93,8 @@ class KindLaw:
         return self.path.closing.closed(shape, pressure, strains)
 
     def anharmonic_at(self, shape, strains, closed):
-        """What reduced.trained.enthalpy's anharmonic forms are made of around free states with these strains (n,
-        6)."""
+        """What reduced.trained.enthalpy's anharmonic forms are made of around free states with these strains
+        (n, 6)."""
         return self.anharmonic.at(self.coordinates.around_inputs(shape, strains, closed), cosine(shape))
 
     def half_width(self, shape, pressure):

@@ -2,8 +2,8 @@
 seen.
 
 Nothing of the held-out designs is used before the last table. Where they are few, laws trained on parts of
-the training designs are judged on the other ones too (reduced.training.states.splits); they find metric and noise
-anew.
+the training designs are judged on the other ones too (reduced.training.states.splits); they find metric and
+noise anew.
 """
 
 import hashlib

@@ -11,6 +11,7 @@ from pneunet.base.files.atomic import read_columns
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.cad.recut import recut
 from pneunet.geometry.reference_cases import CASES
 from pneunet.hifi.cell.file import CellCase
 from pneunet.hifi.cell.problem import CellProblem
@@ -20,7 +21,6 @@ from pneunet.hifi.path.control import LoadControl
 from pneunet.hifi.path.equilibrium import EquilibriumPath
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
-from pneunet.hifi.verification.recut import recut
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 

@@ -47,8 +47,8 @@ class _Enough(Exception):
 
 
 def solve_campaign_case(inputs, directory):
-    """Case of hifi.runs.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure", "limit_share",
-    "prescribed", "slopes": whether free states are differentiated by the shape}.
+    """Case of hifi.runs.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure",
+    "limit_share", "prescribed", "slopes": whether free states are differentiated by the shape}.
 
     directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where
     there was none), top pressure, first touch of walls, why prescribed states are missing, CPU time.
@@ -225,8 +225,8 @@ class Sampler:
 
 
 def first_touch(states):
-    """Pressure (MPa) at which walls touch on the way through the free states (hifi.contact.touch); None where they do
-    not."""
+    """Pressure (MPa) at which walls touch on the way through the free states (hifi.contact.touch); None where
+    they do not."""
     watch, met = TouchWatch(), None
     for s in states:
         if s["kind"] == "free":

@@ -28,8 +28,8 @@ NEAR = 1e-6
 
 
 def save(directory, path, step, stage, identity):
-    """Write the EquilibriumPath of a hifi.body.system.BodySystem after `step` of a `stage`; collective. OSError on
-    all ranks.
+    """Write the EquilibriumPath of a hifi.body.system.BodySystem after `step` of a `stage`; collective.
+    OSError on all ranks.
 
     identity: {name: JSON value} of what the run is of; `read` compares it.
     """

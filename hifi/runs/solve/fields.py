@@ -19,8 +19,8 @@ class FieldWriter:
 
     At points: displacement (mm), pressure (the multiplier, MPa), stretch (largest principal) and
     wall_distance_mm, on facing walls the signed distance from the wall opposite and nan elsewhere; as field
-    data the marks of hifi.contact.touch. Each .vtu appears by rename when it is whole, and only then in solution.pvd:
-    a killed run leaves valid files.
+    data the marks of hifi.contact.touch. Each .vtu appears by rename when it is whole, and only then in
+    solution.pvd: a killed run leaves valid files.
     """
 
     def __init__(self, directory, problem, stretch, walls):

@@ -1,5 +1,5 @@
-"""What a study computes: the functions that hifi.runs.cases runs in a process of their own, one for each kind of
-body.
+"""What a study computes: the functions that hifi.runs.cases runs in a process of their own, one for each kind
+of body.
 
 Both leave levels.csv in the case's folder, a row for each pressure level as it is reached, so that a case
 that is ended half way keeps what it had; and the cell.toml or design.toml with which the single case is run
