@@ -70,10 +70,10 @@ def demo():
     subprocess.run(["make", "demo"], cwd=ROOT, check=True)
     seconds = time.perf_counter() - start
     from pneunet.design.report.comparison import Comparison
-    from pneunet.design.report.rundata import read_run
+    from pneunet.design.report.rundata import read_design_folder
     from pneunet.reduced import choose_law
 
-    designed = read_run(ROOT / "out" / "demo")
+    designed = read_design_folder(ROOT / "out" / "demo")
     comparison = Comparison.of(designed, choose_law(designed.law))
     run = json.loads((ROOT / "out" / "demo" / "solve" / "run.json").read_text())
     return {

@@ -64,7 +64,7 @@ def beside_cell(twists, folder):
     """({key: value}, details) of the segment on two ranks beside the cell's `twists` {pressure in MPa: rad/m}
     on the same mesh size."""
     from benchmarks.rivals import environment
-    from pneunet import launch
+    from pneunet.base.system import launch
 
     command = launch.command_line(
         RANKS, ["--", sys.executable, "-m", "benchmarks.contact_segment", str(folder)]

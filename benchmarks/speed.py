@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.rivals import environment, meshes
 from benchmarks.tables import table
-from pneunet import launch
+from pneunet.base.system import launch
 
 ROOT = Path(__file__).resolve().parent.parent
 MESHES = ROOT / "out" / "bench" / "speed"

@@ -1,6 +1,8 @@
 """`pneunet shape`: the reduced model alone, at any pressures: centrelines, bodies, a picture and an
 animation."""
 
+import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,34 +10,45 @@ import numpy as np
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import atomic_path, output_directory, write_csv
 from pneunet.base.files.record import write_record
+from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
+from pneunet.design.design import checked_kPa
 from pneunet.design.report.labels import plain
-from pneunet.design.search.doubts import WARN, told_doubts
-from pneunet.geometry.designfile import read_design
+from pneunet.design.search.doubts import WARN, tell_doubts
+from pneunet.geometry.designfile import read_design_file
 from pneunet.reduced.choice import choose_law
-from pneunet.reduced.model import predict
+from pneunet.reduced.prediction import doubts, predict
+from pneunet.reduced.rod.laws import SegmentLaw
 
+log = logging.getLogger(__name__)
+STEPS = 5
 FRAMES = 24
 FRAME_PIXELS = (540, 432)
 
 
-def run_shape(design_path, pressures, directory, say=print, law=None, outside=WARN):
-    """Shapes of a design at `pressures` (MPa) by a SegmentLaw, written to directory/shape; by default the
-    trained one that comes along.
+def run_shape(
+    design_path: str | Path,
+    pressures_kPa: Sequence[float] | None,
+    directory: str | Path,
+    law: SegmentLaw | None = None,
+    outside: str = WARN,
+) -> Path:
+    """Shapes of a design's file at pressures, by default STEPS of them up to the design's, in
+    directory/shape.
 
-    outside: 'warn' or 'refuse' where the law doubts the design at one of the pressures.
-
-    centrelines.csv (pressure_kPa, s_mm, x_mm, y_mm, z_mm in target coordinates), body_<pressure>kPa.vtp,
-    bodies.png, inflation.gif, run.json. Pressures beyond the law's limit: the others are written, then
-    ConvergenceError names what is there. Returns the folder.
+    law: by default the trained one that comes along. outside: 'warn' or 'refuse' where the law doubts the
+    design at one of the pressures. centrelines.csv (pressure_kPa, s_mm, x_mm, y_mm, z_mm in target
+    coordinates), body_<pressure>kPa.vtp, bodies.png, inflation.gif, run.json. Pressures beyond the law's
+    limit: the others are written, then ConvergenceError names what is there. Returns the folder.
     """
-    if not pressures:
+    design = read_design_file(design_path)
+    if pressures_kPa is None:
+        pressures_kPa = [design.pressure * KPA_PER_MPA * i / STEPS for i in range(1, STEPS + 1)]
+    if not len(pressures_kPa):
         raise InputError("--pressure-kPa: give at least one pressure")
-    for p in pressures:
-        if not (np.isfinite(p) and 0 <= p <= 2.0):
-            raise InputError(f"--pressure-kPa: {p * 1e3:g} is outside 0..2000 kPa")
-    design = read_design(design_path)
+    pressures = [checked_kPa(p) * MPA_PER_KPA for p in pressures_kPa]
     law = choose_law() if law is None else law
-    doubted = told_doubts(design.manipulator, pressures, law, outside, say)
+    doubted = doubts(design.manipulator, pressures, law)
+    tell_doubts(doubted, law, outside)
     folder = output_directory(Path(directory) / "shape")
     shapes, failed = {}, {}
     for p in sorted(set(pressures)):
@@ -48,26 +61,23 @@ def run_shape(design_path, pressures, directory, say=print, law=None, outside=WA
     write_csv(
         folder / "centrelines.csv",
         ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"],
-        [[p * 1e3, s, *point] for p, line in shapes.items() for s, point in zip(line.s, line.points)],
+        [[p * KPA_PER_MPA, s, *point] for p, line in shapes.items() for s, point in zip(line.s, line.points)],
     )
-    say(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
+    log.info(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
     for p, line in shapes.items():
-        tip = line.points[-1]
-        say(
-            f"  {plain(p * 1e3):>6} kPa: length {line.length:.1f} mm, tip at ({tip[0]:.1f}, {tip[1]:.1f},"
-            f" {tip[2]:.1f}) mm"
-        )
+        tip = ", ".join(f"{x:.1f}" for x in line.points[-1])
+        log.info(f"  {plain(p * KPA_PER_MPA):>6} kPa: length {line.length:.1f} mm, tip at ({tip}) mm")
     try:
-        _pictures(design, shapes, law, folder, say)
+        _pictures(design, shapes, law, folder)
     except ImportError as error:
-        say(f"no pictures: {error}; install them with: pip install 'pneunet[pictures]'")
+        log.info(f"no pictures: {error}; install them with: pip install 'pneunet[pictures]'")
     write_record(
         folder,
         design=str(design_path),
         law=law.name,
         doubts=list(doubted),
-        pressures_kPa=[p * 1e3 for p in shapes],
-        failed_kPa={plain(p * 1e3): why for p, why in failed.items()},
+        pressures_kPa=[p * KPA_PER_MPA for p in shapes],
+        failed_kPa={plain(p * KPA_PER_MPA): why for p, why in failed.items()},
     )
     if failed:
         first = min(failed)
@@ -78,25 +88,25 @@ def run_shape(design_path, pressures, directory, say=print, law=None, outside=WA
 
 
 def _list(pressures):
-    return ", ".join(plain(p * 1e3) for p in pressures)
+    return ", ".join(plain(p * KPA_PER_MPA) for p in pressures)
 
 
-def _pictures(design, shapes, law, folder, say):
+def _pictures(design, shapes, law, folder):
     from pneunet.base.pictures.rendering import view_of
     from pneunet.design.report.bodies import body_mesh
 
     bodies = {p: body_mesh(design.manipulator, p, law, design.base_pose) for p in shapes}
     for p, body in bodies.items():
-        with atomic_path(folder / f"body_{plain(p * 1e3)}kPa.vtp") as temporary:
+        with atomic_path(folder / f"body_{plain(p * KPA_PER_MPA)}kPa.vtp") as temporary:
             body.save(temporary)
     _picture_of_all(
         design, view_of(np.vstack([body.points for body in bodies.values()])), bodies, folder / "bodies.png"
     )
-    say(f"bodies at every pressure: {folder / 'bodies.png'}")
+    log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
     highest = max(shapes)
     if highest > 0:
         _animation(design, highest, law, folder / "inflation.gif")
-        say(f"inflation from 0 to {plain(highest * 1e3)} kPa: {folder / 'inflation.gif'}")
+        log.info(f"inflation from 0 to {plain(highest * KPA_PER_MPA)} kPa: {folder / 'inflation.gif'}")
 
 
 def _picture_of_all(design, view, bodies, path):
@@ -119,7 +129,7 @@ def _picture_of_all(design, view, bodies, path):
         fig.text(
             (5.0 * column + 0.2) / width,
             (top - 0.1) / height,
-            f"{plain(p * 1e3)} kPa",
+            f"{plain(p * KPA_PER_MPA)} kPa",
             fontsize=13,
             weight="bold",
             va="top",
@@ -143,7 +153,7 @@ def _animation(design, highest, law, path):
     frames = []
     for p, body in zip(pressures, bodies):
         frame = Image.fromarray(render(view, painted(body), FRAME_PIXELS))
-        ImageDraw.Draw(frame).text((12, 10), f"{p * 1e3:.0f} kPa", fill=(0, 0, 0))
+        ImageDraw.Draw(frame).text((12, 10), f"{p * KPA_PER_MPA:.0f} kPa", fill=(0, 0, 0))
         frames.append(frame.quantize(64))
     durations = [90] * (FRAMES - 1) + [1200]
     with atomic_path(path) as temporary:

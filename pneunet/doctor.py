@@ -89,9 +89,9 @@ DRAW = (
     "print(type(plotter.render_window).__name__)"
 )
 RANKS = (
-    "import sys; from pneunet import launch\ncode = 'from mpi4py import MPI; c = MPI.COMM_WORLD; s ="
-    " c.allreduce(c.rank); c.rank or print(c.size, s)'\nsys.exit(launch.run(2, ['--', sys.executable, '-c',"
-    " code]))"
+    "import sys; from pneunet.base.system import launch\n"
+    "code = 'from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)'\n"
+    "sys.exit(launch.run(2, ['--', sys.executable, '-c', code]))"
 )
 
 

@@ -201,3 +201,23 @@ def test_no_two_public_classes_share_a_name():
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(relative(path))
     assert {name: found for name, found in places.items() if len(found) > 1} == {}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_public_functions_are_annotated(package):
+    """Every argument and the answer of functions and methods without an underscore."""
+    bare = []
+    for path in (ROOT / package).rglob("*.py"):
+        if relative(path).startswith("hifi/verification/"):
+            continue  # problems, which tests and the bench call alone
+        tree = ast.parse(path.read_text())
+        classes = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name[0] != "_"]
+        for node in [n for place in (tree, *classes) for n in place.body if isinstance(n, ast.FunctionDef)]:
+            if node.name.startswith("_"):
+                continue
+            a = node.args
+            given = [*a.posonlyargs, *a.args, *a.kwonlyargs, *filter(None, (a.vararg, a.kwarg))]
+            named = [arg for arg in given if arg.annotation is None and arg.arg not in ("self", "cls")]
+            if named or node.returns is None:
+                bare.append(f"{relative(path)}:{node.lineno}: {node.name}")
+    assert bare == []

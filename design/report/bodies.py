@@ -1,22 +1,32 @@
 """Bodies to render: the reduced model's, the finite elements', curves as tubes (base.pictures.rendering makes
 pictures of them)."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pneunet.base import se3
 from pneunet.base.pictures.rendering import edges
 from pneunet.base.pictures.walls import FIELD
 from pneunet.design.report.labels import TARGET, segment_colour
+from pneunet.geometry.parameters import Manipulator
+from pneunet.reduced.rod.laws import SegmentLaw
+
+if TYPE_CHECKING:
+    from pyvista import PolyData, UnstructuredGrid
 
 
-def tube(points, radius=0.9, colour=TARGET):
+def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple:
     """A curve (n, 3) as something to render."""
     import pyvista
 
     return pyvista.lines_from_points(np.asarray(points, float)).tube(radius=radius), {"color": colour}
 
 
-def body_mesh(manipulator, pressure, law, base_pose):
+def body_mesh(
+    manipulator: Manipulator, pressure: float, law: SegmentLaw, base_pose: np.ndarray | None
+) -> "PolyData":
     """The reduced model's body (pyvista.PolyData, mm, target coordinates), cell data "segment" 1.. ."""
     import pyvista
 
@@ -28,7 +38,7 @@ def body_mesh(manipulator, pressure, law, base_pose):
     return mesh
 
 
-def painted(mesh):
+def painted(mesh: "PolyData") -> list:
     """A body in the colours of its segments, with its sharp edges, as things to render."""
     from matplotlib.colors import to_rgb
 
@@ -39,7 +49,7 @@ def painted(mesh):
     return [(mesh, {"scalars": "colour", "rgb": True, "preference": "cell"}), edges(mesh)]
 
 
-def read_solution(path):
+def read_solution(path: str | Path) -> "UnstructuredGrid":
     """The last step of a ParaView collection as the undeformed pyvista grid with its point data."""
     import pyvista
 
@@ -48,7 +58,7 @@ def read_solution(path):
     return reader.read()[0]
 
 
-def facing_walls(surface):
+def facing_walls(surface: "PolyData") -> "PolyData":
     """The part of a solution's surface where walls face each other across a gap (point data FIELD); None
     without any."""
     if FIELD not in surface.point_data:
@@ -58,7 +68,7 @@ def facing_walls(surface):
     return walls if walls.n_cells else None
 
 
-def deformed_surface(grid, base_pose):
+def deformed_surface(grid: "UnstructuredGrid", base_pose: np.ndarray | None) -> "PolyData":
     """(surface, sharp edges) of a solution, moved by its displacement and into target coordinates; point data
     "displacement length" (mm) beside the solver's own."""
     surface = grid.extract_surface(nonlinear_subdivision=1)

@@ -9,8 +9,10 @@ from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError
 from pneunet.base.strains import RodStrains
 from pneunet.design.report.labels import plain
+from pneunet.design.report.rundata import DesignFolder
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.reduced.model import doubts, predict
+from pneunet.reduced.rod.laws import SegmentLaw
 
 # what the words of the verdict mean, in % of length (RMS of points paired by arc length)
 CONFIRMS, ROUGHLY = 2.0, 5.0
@@ -36,7 +38,7 @@ class Comparison:
     nearest: tuple | None = None
 
     @classmethod
-    def of(cls, run, law):
+    def of(cls, run: DesignFolder, law: SegmentLaw) -> "Comparison":
         design = run.design
         doubted = doubts(design.manipulator, design.pressure, law)
         doubted = doubts(design.manipulator, design.pressure, law)
@@ -106,7 +108,7 @@ def _loading(run):
     return notes
 
 
-def smooth(s, points, spacing=1.0):
+def smooth(s: np.ndarray, points: np.ndarray, spacing: float = 1.0) -> np.ndarray:
     """Points (m, 3) about `spacing` mm apart on the cubic spline through section origins (n, 3) at s (n,) mm:
     the stations of the finite element solution lie a pitch apart, and their chords cut corners."""
     fine = np.linspace(s[0], s[-1], int(np.ceil((s[-1] - s[0]) / spacing)) + 1)
@@ -121,7 +123,7 @@ def _nearest(run):
     return min(tried, key=lambda item: item[1].rms)
 
 
-def stopped_short(run):
+def stopped_short(run: DesignFolder) -> bool:
     """Whether the finite element solution ended below the design pressure (by more than rounding)."""
     return run.solve is not None and run.solve.pressure < run.design.pressure * (1 - 1e-6)
 
@@ -138,7 +140,7 @@ def _errors(curve, reference):
     return None if curve is None or reference is None else compare(curve, reference)
 
 
-def overlaps(run):
+def overlaps(run: DesignFolder) -> list[str]:
     """Sentences on what overlaps in the finite element solution: walls, parts of the body; [] when nothing
     does."""
     solve, told = run.solve, []
@@ -172,7 +174,7 @@ def _from(record, name):
     )
 
 
-def verdict(run, comparison):
+def verdict(run: DesignFolder, comparison: "Comparison") -> str:
     """The result in one honest sentence, and what forbids to trust it: a solution in which walls overlap
     confirms nothing."""
     c, design = comparison, run.design

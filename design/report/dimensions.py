@@ -1,18 +1,20 @@
 """Drawing at a fixed scale with dimension lines: distances of lines and text are inches on paper, the part is
 in mm."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 INK, LINE = "#1b1f24", "#55606b"
 TEXT_SIZE = 7.5
 
 
-def text_width(text, size=TEXT_SIZE):
+def text_width(text: str, size: float = TEXT_SIZE) -> None:
     """Estimated width of a line of text in inches."""
     return 0.56 * size * len(text) / 72
 
 
-def spread(positions, distance):
+def spread(positions: Sequence[float], distance: float) -> None:
     """Positions moved as little as needed to be `distance` apart, order kept (least squares by pooling)."""
     order = np.argsort(positions, kind="stable")
     wanted = np.asarray(positions, float)[order] - distance * np.arange(len(order))
@@ -48,25 +50,37 @@ class SheetView:
         self.ax.set_ylim(self.y0, self.y1)
         self.ax.set_axis_off()
 
-    def mm(self, inches):
+    def mm(self, inches: float) -> None:
         return inches / self.scale
 
-    def text(self, x, y, text, ha="center", va="center", size=TEXT_SIZE, weight="normal", rotation=0):
+    def text(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        ha: str = "center",
+        va: str = "center",
+        size: float = TEXT_SIZE,
+        weight: str = "normal",
+        rotation: float = 0,
+    ) -> None:
         self.ax.text(x, y, text, ha=ha, va=va, fontsize=size, weight=weight, color=INK, rotation=rotation)
 
-    def title(self, x, y, text):
+    def title(self, x: float, y: float, text: str) -> None:
         """The name of a view, ending at (x, y)."""
         self.text(x, y, text, ha="right", size=9, weight="bold")
 
-    def heading(self, text):
+    def heading(self, text: str) -> None:
         """A title centred at the top of the rectangle."""
         self.text((self.x0 + self.x1) / 2, self.y1 - self.mm(0.14), text, size=8.5, weight="bold")
 
-    def line(self, points, width=0.6, style="-", colour=LINE):
+    def line(self, points: np.ndarray, width: float = 0.6, style: str = "-", colour: str = LINE) -> None:
         x, y = zip(*points)
         self.ax.plot(x, y, linewidth=width, linestyle=style, color=colour, solid_capstyle="butt")
 
-    def polygon(self, corners, face, width=0.8, style="-", alpha=1.0):
+    def polygon(
+        self, corners: np.ndarray, face: str, width: float = 0.8, style: str = "-", alpha: float = 1.0
+    ) -> None:
         from matplotlib.patches import Polygon
 
         self.ax.add_patch(
@@ -81,7 +95,7 @@ class SheetView:
             )
         )
 
-    def cut(self, solids, voids, colour, clip=None):
+    def cut(self, solids: list, voids: list, colour: str, clip: tuple | None = None) -> None:
         """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); broken off at the x of
         `clip`."""
         from matplotlib.patches import Rectangle
@@ -110,7 +124,7 @@ class SheetView:
                     linestyle=(0, (6, 2, 1, 2)),
                 )
 
-    def axes_cross(self):
+    def axes_cross(self) -> None:
         """The channel axis as a small centre mark."""
         r = self.mm(0.1)
         self.line([(-r, 0), (r, 0)], width=0.6)
@@ -134,7 +148,7 @@ class SheetView:
         for tail, head in pairs:
             self.ax.annotate("", xy=head, xytext=tail, arrowprops=style)
 
-    def horizontal(self, x0, x1, y_part, y, text):
+    def horizontal(self, x0: float, x1: float, y_part: float, y: float, text: str) -> None:
         """A dimension between x0 and x1, its line at y, extension lines from y_part."""
         over = self.mm(0.05) * np.sign(y - y_part)
         for x in (x0, x1):
@@ -146,7 +160,7 @@ class SheetView:
         else:
             self.text(x1 + self.mm(0.08 if inside else 0.2), y, text, ha="left")
 
-    def between(self, x0, x1, y, text):
+    def between(self, x0: float, x1: float, y: float, text: str) -> None:
         """The link of a chain (`chain_below`) that has room for its text on the line."""
         self.line([(x0, y), (x1, y)], width=0.6)
         self._on_line((x0 + x1) / 2, y, text)
@@ -155,14 +169,14 @@ class SheetView:
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
         self.ax.text(x, y, text, ha="center", va="center", fontsize=TEXT_SIZE, color=INK, bbox=box)
 
-    def vertical(self, y0, y1, x_part, x, text):
+    def vertical(self, y0: float, y1: float, x_part: float, x: float, text: str) -> None:
         """A dimension between y0 and y1, its line at x left of the part."""
         for y in (y0, y1):
             self.line([(x_part, y), (x - self.mm(0.05), y)], width=0.35)
         self._arrows((x, y0), (x, y1), (y1 - y0) * self.scale > 0.3)
         self.text(x - self.mm(0.06), (y0 + y1) / 2, text, ha="right")
 
-    def ladder(self, intervals, x_part, x):
+    def ladder(self, intervals: list, x_part: float, x: float) -> None:
         """Neighbouring vertical dimensions (y0, y1, text) in one column at x, their labels spread apart."""
         middles = [(a + b) / 2 for a, b, _ in intervals]
         levels = spread(middles, self.mm(0.16))
@@ -179,7 +193,7 @@ class SheetView:
             self.line([(x, middle), (x + self.mm(0.18), level), (x + self.mm(0.24), level)], width=0.35)
             self.text(x + self.mm(0.27), level, text, ha="left")
 
-    def chain_below(self, intervals, y_part, y):
+    def chain_below(self, intervals: list, y_part: float, y: float) -> None:
         """Short neighbouring horizontal dimensions (x0, x1, text) with upright labels below the line."""
         levels = spread([(a + b) / 2 for a, b, _ in intervals], self.mm(0.13))
         for (a, b, text), level in zip(intervals, levels):
@@ -194,7 +208,7 @@ class SheetView:
             self.line([((a + b) / 2, y), (level, y - self.mm(0.08))], width=0.35)
             self.text(level, y - self.mm(0.1), text, va="top", rotation=90, size=7)
 
-    def angle(self, corner, degrees, radius):
+    def angle(self, corner: np.ndarray, degrees: float, radius: float) -> None:
         """The angle of a line through `corner` with the x axis: the line, an arc of `radius` inches and the
         value."""
         from matplotlib.patches import Arc
@@ -207,7 +221,7 @@ class SheetView:
         half = np.radians(degrees / 2)
         self.text(*(corner + 0.62 * r * np.array([np.cos(half), np.sin(half)])), f"{degrees:.4g}°", size=7)
 
-    def balloon(self, x, y, number, text, colour):
+    def balloon(self, x: float, y: float, number: int, text: str, colour: str) -> None:
         """A numbered circle with a line of text at its right, centred on x."""
         shift = self.mm(0.13 + text_width(text, 8.5)) / 2
         self.ax.text(

@@ -1,11 +1,21 @@
 """The dimensioned drawing of a manipulator: plan, side view, sections with every dimension in mm, table of
 segments."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
 from pneunet.base.files.atomic import atomic_path
 from pneunet.design.report.dimensions import SheetView
 from pneunet.design.report.labels import REDUCED, plain, segment_colour, segment_mode
 from pneunet.design.report.section_views import cross_section, normal_section, section_groups, section_scale
-from pneunet.geometry.parameters import TWISTING
+from pneunet.geometry.designfile import DesignFile
+from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 SHEET_WIDTH = 16.5  # inches, the width of A3
 MARGIN = 0.45
@@ -15,7 +25,7 @@ PANEL_HEIGHT = 3.6
 INK = "#1b1f24"
 
 
-def segment_table(manipulator):
+def segment_table(manipulator: Manipulator) -> list:
     """Rows (label, [text for every segment]) of all dimensions, lengths in mm, for the drawing and the
     report."""
 
@@ -59,7 +69,7 @@ def segment_table(manipulator):
     ]
 
 
-def chamber_plan(segment, x, thickness, half_width, side):
+def chamber_plan(segment: Segment, x: float, thickness: float, half_width: float, side: int) -> np.ndarray:
     """Plan corners (4, 2) in mm of a chamber or cavity centred at x; side -1 is the set turned half a turn
     about x."""
     half, slant = thickness / segment.sin / 2, segment.cot * half_width * side
@@ -71,14 +81,14 @@ def chamber_plan(segment, x, thickness, half_width, side):
     ]
 
 
-def draw_drawing(design, path):
+def draw_drawing(design: DesignFile, path: str | Path) -> None:
     """Write the drawing of a `geometry.designfile.Design` as a PNG (or SVG, PDF: by the suffix of `path`)."""
     figure = drawing_figure(design)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=130)
 
 
-def drawing_figure(design):
+def drawing_figure(design: DesignFile) -> "Figure":
     """The drawing as a matplotlib Figure, `SHEET_WIDTH` inches wide and as high as its content."""
     from matplotlib.figure import Figure
 

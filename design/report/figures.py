@@ -1,5 +1,7 @@
 """The report's pictures; each function writes one PNG or several and returns [(file name, caption)]."""
 
+from pathlib import Path
+
 import numpy as np
 
 from pneunet.base.errors import ConvergenceError
@@ -7,10 +9,13 @@ from pneunet.base.pictures import rendering
 from pneunet.base.pictures.rendering import figure, save
 from pneunet.base.pictures.walls import TOUCHING, draw_walls
 from pneunet.design.report import bodies
+from pneunet.design.report.comparison import Comparison
 from pneunet.design.report.drawing import chamber_plan
 from pneunet.design.report.labels import FINITE_ELEMENTS, plain, segment_colour
 from pneunet.design.report.pictures import curve_panels, legend, segment_bands
+from pneunet.design.report.rundata import DesignFolder
 from pneunet.reduced.model import predict
+from pneunet.reduced.rod.laws import SegmentLaw
 
 
 def _mark(run):
@@ -18,7 +23,7 @@ def _mark(run):
     return " (overlaps)" * bool(run.solve and (run.solve.walls_overlap or run.solve.body_overlap))
 
 
-def curve_picture(run, comparison, folder):
+def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> list[tuple[str, str]]:
     """Target, reduced and finite element centrelines over each other."""
     design = run.design
     curves = []
@@ -54,7 +59,9 @@ def curve_picture(run, comparison, folder):
     ]
 
 
-def body_pictures(run, comparison, law, folder):
+def body_pictures(
+    run: DesignFolder, comparison: "Comparison", law: SegmentLaw, folder: Path
+) -> list[tuple[str, str]]:
     """Target, reduced body, finite element body and the reference body from one camera at one scale; fields
     on the finite element body."""
     design = run.design
@@ -137,7 +144,7 @@ def body_pictures(run, comparison, law, folder):
     return out
 
 
-def history_picture(run, law, folder):
+def history_picture(run: DesignFolder, law: SegmentLaw, folder: Path) -> list[tuple[str, str]]:
     """Tip, volume, wall distance and stretch against pressure; the reduced tip dashed."""
     steps, design = run.solve.steps, run.design
     p = steps["pressure_kPa"]
@@ -208,7 +215,7 @@ def history_picture(run, law, folder):
     ]
 
 
-def touching_picture(run, folder):
+def touching_picture(run: DesignFolder, folder: Path) -> list[tuple[str, str]]:
     """The deformed body, its facing walls coloured by their distance; [] without fields or gaps."""
     if run.solve.solution is None:
         return []
@@ -234,7 +241,7 @@ def touching_picture(run, folder):
     ]
 
 
-def wall_picture(run, folder):
+def wall_picture(run: DesignFolder, folder: Path) -> list[tuple[str, str]]:
     """Plan strips of the upper and the lower side, every gap coloured by the smallest distance of its
     walls."""
     from matplotlib.cm import ScalarMappable

@@ -2,7 +2,7 @@
 
 import math
 
-from pneunet.geometry.parameters import TWISTING
+from pneunet.geometry.parameters import TWISTING, Segment
 
 TARGET, REDUCED, FINITE_ELEMENTS = "#30363d", "#1f6fb2", "#d9480f"
 STYLES = {
@@ -13,18 +13,18 @@ STYLES = {
 SEGMENT_COLOURS = ("#8fc1a4", "#ecc46a", "#bda0d0", "#e2a0ae", "#a5b8c9")
 
 
-def segment_colour(index):
+def segment_colour(index: int) -> str:
     return SEGMENT_COLOURS[index % len(SEGMENT_COLOURS)]
 
 
-def plain(value, decimals=2):
+def plain(value: float, decimals: int = 2) -> str:
     """A number without trailing zeros: 2 -> '2', 5.7735 -> '5.77'."""
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return "0" if text in ("-0", "") else text
 
 
-def significant(value, digits=4):
+def significant(value: float, digits: int = 4) -> str:
     """A number of `digits` significant digits, never with an exponent: 193812.3 -> '193800', 0.01234 ->
     '0.01234'."""
     if value == 0:
@@ -33,13 +33,13 @@ def significant(value, digits=4):
     return plain(round(value, decimals), max(decimals, 0))
 
 
-def segment_mode(segment):
+def segment_mode(segment: Segment) -> str:
     """What a segment does: twisting; bending at exactly 90 degrees; else helical."""
     if segment.kind == TWISTING:
         return "twisting"
     return "bending" if segment.cot == 0 else "helical"
 
 
-def segment_name(segment):
+def segment_name(segment: Segment) -> str:
     """'twisting 60° × 8'"""
     return f"{segment_mode(segment)} {plain(segment.angle, 1)}° × {segment.chambers}"

@@ -1,14 +1,31 @@
 """Pictures of centrelines in matplotlib: 3D with equal scale, two projections, and the picture of a
 design."""
 
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pneunet.base.pictures.rendering import camera_angles, figure, save
 from pneunet.design.report.labels import STYLES, plain, segment_colour, segment_name, significant
-from pneunet.design.report.rundata import read_run
+from pneunet.design.target.metrics import Errors
+from pneunet.geometry.parameters import Manipulator
+
+if TYPE_CHECKING:
+    from mpl_toolkits.mplot3d.axes3d import Axes
 
 
-def equal_axes_3d(ax, points, pad=0.06):
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pneunet.design.design import Design
+
+log = logging.getLogger(__name__)
+
+
+def equal_axes_3d(ax: "Axes", points: np.ndarray, pad: float = 0.06) -> None:
     """Limits of 3D axes that hold points (n, 3) at one scale in x, y and z; labels in mm."""
     from matplotlib.ticker import MaxNLocator
 
@@ -25,7 +42,7 @@ def equal_axes_3d(ax, points, pad=0.06):
     ax.tick_params(labelsize=8, pad=1)
 
 
-def curve_panels(figure, curves, segments=None, bottom=0.06):
+def curve_panels(figure: "Figure", curves: list, segments: Sequence = None, bottom: float = 0.06) -> None:
     """3D view and the x-y and x-z projections of curves.
 
     curves : [(label, points (n, 3) in mm, style of STYLES)]. segments : [(colour, points)], bands under the
@@ -60,7 +77,9 @@ def curve_panels(figure, curves, segments=None, bottom=0.06):
         ax.tick_params(labelsize=8)
 
 
-def segment_bands(manipulator, s, points):
+def segment_bands(
+    manipulator: Manipulator, s: np.ndarray, points: np.ndarray
+) -> list[tuple[str, np.ndarray]]:
     """[(colour, points)] of the stretches of a centreline (s undeformed, mm) that belong to each segment."""
     ends = manipulator.starts + [seg.length for seg in manipulator.segments]
     bands = []
@@ -72,7 +91,7 @@ def segment_bands(manipulator, s, points):
     return bands
 
 
-def legend(figure, curves, manipulator):
+def legend(figure: "Figure", curves: list, manipulator: Manipulator) -> None:
     """At the top right: what the lines are, and below it the segments' colours with their names."""
     from matplotlib.lines import Line2D
 
@@ -94,7 +113,7 @@ def legend(figure, curves, manipulator):
         )
 
 
-def error_caption(errors):
+def error_caption(errors: Errors) -> str:
     """The four errors and the length mismatch (`design.target.metrics.Errors`) in two lines."""
 
     def both(mm):
@@ -109,31 +128,30 @@ def error_caption(errors):
     )
 
 
-def draw_design(directory):
-    """Write design.png of a run directory: target against the reduced prediction, errors, segments,
-    pressure."""
-    from pneunet.design.target.metrics import compare
-
-    run = read_run(directory)
-    s, points = run.centreline
-    curves = [("reduced prediction", points, "reduced")]
-    caption = "no target.csv beside the design: only the prediction is shown"
-    if run.target is not None:
-        curves.insert(0, ("target", run.target, "target"))
-        caption = error_caption(compare(points, run.target))
-    design = run.design
+def design_figure(design: "Design") -> "Figure":
+    """Target against the reduced prediction of a pneunet.design.design.Design, errors, segments, pressure."""
+    line, content = design.prediction, design.content
+    curves = [("reduced prediction", line.points, "reduced")]
+    caption = "no target beside the design: only the prediction is shown"
+    if design.target is not None and design.errors is not None:
+        curves.insert(0, ("target", design.target.points, "target"))
+        caption = error_caption(design.errors)
     fig = figure(12.0, 7.0)
-    curve_panels(fig, curves, segment_bands(design.manipulator, s, points), bottom=0.15)
+    curve_panels(fig, curves, segment_bands(design.manipulator, line.s, line.points), bottom=0.15)
     legend(fig, curves, design.manipulator)
-    fig.text(0.025, 0.975, design.name, fontsize=15, weight="bold", va="top")
-    fig.text(
-        0.025,
-        0.925,
-        f"{plain(design.pressure * 1e3)} kPa, {design.manipulator.chambers} chambers, "
-        f"{plain(design.manipulator.length, 1)} mm long at rest",
-        fontsize=10,
-        va="top",
-    )
+    fig.text(0.025, 0.975, content.name, fontsize=15, weight="bold", va="top")
+    told = f"{plain(design.pressure_kPa)} kPa, {design.manipulator.chambers} chambers"
+    told += f", {plain(design.manipulator.length, 1)} mm long at rest"
+    fig.text(0.025, 0.925, told, fontsize=10, va="top")
     fig.text(0.025, 0.02, caption, fontsize=9, linespacing=1.5)
-    save(fig, run.directory / "design.png")
-    return run.directory / "design.png"
+    return fig
+
+
+def draw_design(design: "Design", path: str | Path) -> bool:
+    """Write design_figure as a PNG; False, with a line in the log, without matplotlib."""
+    try:
+        save(design_figure(design), path)
+    except ImportError:
+        log.info("no picture: matplotlib is missing, install it with: pip install 'pneunet[pictures]'")
+        return False
+    return True

@@ -1,6 +1,7 @@
 """`pneunet report`: one self-contained page that shows what was asked, designed, predicted and proven."""
 
 import base64
+import logging
 from html import escape
 from pathlib import Path
 
@@ -12,9 +13,11 @@ from pneunet.design.report import figures
 from pneunet.design.report.comparison import CONFIRMS, ROUGHLY, Comparison, overlaps, stopped_short, verdict
 from pneunet.design.report.drawing import draw_drawing, segment_table
 from pneunet.design.report.labels import plain, segment_name, significant
-from pneunet.design.report.rundata import read_run
+from pneunet.design.report.rundata import read_design_folder
 from pneunet.reduced.choice import choose_law
+from pneunet.reduced.rod.laws import SegmentLaw
 
+log = logging.getLogger(__name__)
 STYLE = """
 :root { color-scheme: light; }
 body {
@@ -52,13 +55,13 @@ footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
 """
 
 
-def write_report(directory, say=print, law=None):
+def write_report(directory: str | Path, law: SegmentLaw | None = None) -> Path:
     """Write directory/report.html and its pictures in directory/report/; returns the path of the page.
 
     law: a SegmentLaw, by default the one that the folder was designed with. Shows what is there: without a
     mesh or a finite element solution it says so. InputError without design.toml.
     """
-    run = read_run(directory)
+    run = read_design_folder(directory)
     law = choose_law(run.law) if law is None else law
     folder = output_directory(run.directory / "report")
     comparison = Comparison.of(run, law)
@@ -84,8 +87,8 @@ def write_report(directory, say=print, law=None):
     )
     path = run.directory / "report.html"
     write_text(path, page)
-    say(verdict(run, comparison))
-    say(f"report: {path}")
+    log.info(verdict(run, comparison))
+    log.info(f"report: {path}")
     return path
 
 

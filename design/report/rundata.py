@@ -9,6 +9,7 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns, read_csv
 from pneunet.base.strains import RodStrains
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.designfile import Design, body_tables, read_design
 from pneunet.reduced.choice import TRAINED
 
@@ -32,7 +33,7 @@ STEP_COLUMNS = [
 
 
 @dataclass(frozen=True)
-class Solve:
+class Solution:
     """The finite element solution. Lengths in mm, body frame; kPa as in the files.
 
     steps: {column: (n,)}, "seconds" counted from the start; pressure of the last accepted step in MPa; s
@@ -54,22 +55,41 @@ class Solve:
     solution: Path | None
     record: dict
 
+    def __repr__(self) -> str:
+        reached = f"{len(self.steps['step'])} steps to {self.pressure_kPa:.4g} kPa"
+        return f"<Solution: {reached}, tip at {self.tip.round(2)} mm>"
+
     @property
-    def walls_overlap(self):
+    def pressure_kPa(self) -> float:
+        """Of the last accepted step."""
+        return self.pressure * KPA_PER_MPA
+
+    @property
+    def tip(self) -> np.ndarray:
+        """(3,) last point of the centreline, mm."""
+        return self.points[-1]
+
+    @property
+    def fields(self) -> list[Path]:
+        """ParaView's files, one a step, in order; pyvista.read opens them."""
+        return sorted(self.solution.parent.glob("step_*.vtu")) if self.solution else []
+
+    @property
+    def walls_overlap(self) -> bool:
         return bool(self.steps["walls_overlap"][-1])
 
     @property
-    def body_overlap(self):
+    def body_overlap(self) -> bool:
         return bool(self.steps["body_overlap"][-1])
 
     @property
-    def contact(self):
+    def contact(self) -> bool:
         """Whether a contact model kept neighbouring walls apart."""
         return bool(self.record.get("contact", False))
 
 
 @dataclass(frozen=True)
-class Run:
+class DesignFolder:
     """directory; design; target (n, 3) and centreline (s (m,), points (m, 3)) in target coordinates; mesh,
     record: the JSON files; solve; stale: the folder holds a solution of another body, or under other loads,
     than design.toml's, which is left out."""
@@ -80,17 +100,17 @@ class Run:
     centreline: tuple | None
     record: dict
     mesh: dict
-    solve: Solve | None
+    solve: Solution | None
     stale: bool = False
 
     @property
-    def law(self):
+    def law(self) -> str:
         """Name of the law that `pneunet design` took."""
         return self.record.get("inputs", {}).get("law", TRAINED)
 
 
-def read_run(directory):
-    """The Run in a directory that holds at least design.toml; InputError otherwise."""
+def read_design_folder(directory: str | Path) -> "DesignFolder":
+    """The DesignFolder in a directory that holds at least design.toml; InputError otherwise."""
     directory = Path(directory)
     if not (directory / "design.toml").is_file():
         raise InputError(f"{directory}: holds no design.toml: give the folder that `pneunet design -o` wrote")
@@ -100,7 +120,7 @@ def read_run(directory):
     design, solve = read_design(directory / "design.toml"), _solve(directory / "solve")
     ours = {"body": body_tables(design.manipulator), "loads": design.loads.table()}
     stale = solve is not None and any(solve.record.get(name, value) != value for name, value in ours.items())
-    return Run(
+    return DesignFolder(
         directory,
         design,
         read_columns(target, POINTS) if target.is_file() else None,
@@ -137,7 +157,7 @@ def _solve(directory):
     )
     strains = strains[strains[:, 0] == last]
     solution = directory / "solution.pvd"
-    return Solve(
+    return Solution(
         steps=dict(zip(STEP_COLUMNS, table.T)),
         pressure=table[-1, 1] * 1e-3,
         s=centreline[:, 1],

@@ -1,13 +1,19 @@
 """The two sections of a segment with their dimensions: through a chamber, and across the chambers."""
 
+from typing import TYPE_CHECKING
+
 from pneunet.design.report.dimensions import SheetView
 from pneunet.design.report.labels import plain, segment_colour
-from pneunet.geometry.parameters import TWISTING
+from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 ROW = 0.24  # inches between dimension lines
 
 
-def section_groups(manipulator):
+def section_groups(manipulator: Manipulator) -> list:
     """Lists of segment indices that share the same cross-section (everything but angle, number, ends and
     material)."""
     groups = {}
@@ -32,7 +38,7 @@ def section_groups(manipulator):
     return list(groups.values())
 
 
-def section_scale(s, width, height):
+def section_scale(s: Segment, width: float, height: float) -> float:
     """Inches per mm at which both sections of a segment leave room for their dimensions in a panel
     (inches)."""
     normal_width = 2 * s.chamber_thickness + s.gap + 3.0
@@ -45,7 +51,9 @@ def _named(group, what):
     return f"{what}, segment{'s' * (len(group) > 1)} {', '.join(str(i + 1) for i in group)}"
 
 
-def cross_section(figure, rectangle, scale, manipulator, group):
+def cross_section(
+    figure: "Figure", rectangle: tuple, scale: float, manipulator: Manipulator, group: list
+) -> None:
     """Section through a chamber, seen along x."""
     s = manipulator.segments[group[0]]
     view = SheetView(figure, rectangle, scale, 0.0, (s.chamber_top + s.chamber_bottom) / 2, right=-0.1)
@@ -91,7 +99,9 @@ def cross_section(figure, rectangle, scale, manipulator, group):
     view.ladder(core, half, half + view.mm(0.2))
 
 
-def normal_section(figure, rectangle, scale, manipulator, group):
+def normal_section(
+    figure: "Figure", rectangle: tuple, scale: float, manipulator: Manipulator, group: list
+) -> None:
     """Section across the chambers on the channel axis."""
     s = manipulator.segments[group[0]]
     pairs = min(2, max(manipulator.segments[i].chambers for i in group))

@@ -1,23 +1,25 @@
 """What to do about a design that the law doubts: warn of it, or refuse it."""
 
+import logging
+from collections.abc import Sequence
+
 from pneunet.base.errors import InputError
-from pneunet.reduced.model import doubts
+from pneunet.reduced.rod.laws import SegmentLaw
 
 WARN, REFUSE = "warn", "refuse"
-OUTSIDE = (WARN, REFUSE)
+WAYS = (WARN, REFUSE)
+log = logging.getLogger(__name__)
 
 
-def told_doubts(manipulator, pressure, law, outside, say):
-    """The law's doubts (lines of text) about a manipulator at a pressure (MPa) or several, said once;
-    InputError where refused."""
-    if outside not in OUTSIDE:
-        raise InputError(f"outside = '{outside}' is not known: write {' or '.join(OUTSIDE)}")
-    found = doubts(manipulator, pressure, law)
-    if found and outside == REFUSE:
+def tell_doubts(doubts: Sequence[str], law: SegmentLaw, outside: str) -> None:
+    """Say a law's doubts (reduced.prediction.doubts) about a manipulator; InputError where they are
+    refused."""
+    if outside not in WAYS:
+        raise InputError(f"outside = '{outside}' is not known: write {' or '.join(WAYS)}")
+    if doubts and outside == REFUSE:
         raise InputError(
-            f"refused, because the law '{law.name}' doubts the design: {'; '.join(found)} (--outside warn"
+            f"refused, because the law '{law.name}' doubts the design: {'; '.join(doubts)} (--outside warn"
             " takes it)"
         )
-    for text in found:
-        say(f"warning: {text}")
-    return found
+    for text in doubts:
+        log.warning(f"warning: {text}")

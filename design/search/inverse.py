@@ -4,20 +4,24 @@ Bounded least squares over angles, dimensions, numbers of chambers, the common p
 the base: a first guess from the lookup table, then chambers counted as real numbers, then as whole ones.
 """
 
+import logging
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from pneunet.base import se3
+from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.design.search.lookup import first_guesses
 from pneunet.design.search.problem import EQ27, OBJECTIVES, PAIRED, PAIRS, Calls, Problem, Trial
 from pneunet.design.search.space import Variable, grid, limits, prototype
-from pneunet.design.target.curves import evenly
-from pneunet.design.target.target import PRESSURE_LIMIT
+from pneunet.design.target.extraction import Extracted
+from pneunet.design.target.target import PRESSURE_LIMIT, Target
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.analytic.clearance import gap_left
+from pneunet.reduced.rod.laws import SegmentLaw
 
 LEAST_PRESSURE = 0.002  # MPa
 INSET = 0.05  # of a variable's range: starts keep off the bounds, where the interior method crawls
@@ -28,10 +32,11 @@ SPLIT_KEPT = 0.3  # a segment's number of chambers stays within this fraction of
 GOOD_ENOUGH = 1.05
 FINE_ENOUGH = 1e-3  # objective over the curve's length at which it stops as well
 ROUNDING = {"angle": 2}  # decimals; mm and everything else to 3
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Solution:
+class Found:
     """base_pose (4, 4) in target coordinates; pressure in MPa; cost in mm^2; active: bounds the optimum sits
     on."""
 
@@ -44,8 +49,8 @@ class Solution:
     evaluations: int
 
 
-def solve(target, pieces, law, objective=PAIRED, say=print):
-    """The `Solution` for a Target split into `pieces` (`Extracted`).
+def search(target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objective: str = PAIRED) -> Found:
+    """The `Found` for a Target split into `pieces` (`Extracted`).
 
     InputError where the pieces cannot be built, ConvergenceError where the law has no answer at any pressure.
     """
@@ -57,16 +62,16 @@ def solve(target, pieces, law, objective=PAIRED, say=print):
         raise ConvergenceError(
             "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
         )
-    say(
+    log.info(
         f"lookup table: first guess at {1e3 * guesses[0].pressure:.1f} kPa, angles "
         + _angles(guesses[0].segments)
     )
     run = _Run.start(target, pieces, law, guesses[0]).optimised(real_counts=True)
     if objective == EQ27:
         run = run.with_objective(EQ27).optimised(real_counts=True)
-    say(f"real-valued optimum: {run.title}")
+    log.info(f"real-valued optimum: {run.title}")
     run = _whole_chambers(run)
-    say(f"whole chambers:      {run.title}")
+    log.info(f"whole chambers:      {run.title}")
     return run.solution()
 
 
@@ -164,8 +169,8 @@ class _Run:
         form."""
         problem, free = self.problem, self.problem.turns.shape[1]
         trial = Trial(problem, self.variables, self._x(self.variables))
-        points = evenly(trial.centreline(problem.law, np.zeros(3)).points, PAIRS) @ problem.rotation
-        wanted = (evenly(problem.target.points, PAIRS) - problem.target.points[0]) @ problem.rotation
+        points = Curve(trial.centreline(problem.law, np.zeros(3)).points).evenly(PAIRS) @ problem.rotation
+        wanted = (problem.target.curve.evenly(PAIRS) - problem.target.points[0]) @ problem.rotation
         moment = points.T @ wanted
         turn = np.eye(3)
         if free == 1:
@@ -250,7 +255,7 @@ class _Run:
             about_to_touch(segments, pressure)
         )
         pose = se3.make_pose(self.problem.rotation, self.problem.target.points[0])
-        return Solution(
+        return Found(
             Manipulator(tuple(segments)),
             pressure,
             pose,
@@ -261,7 +266,7 @@ class _Run:
         )
 
 
-def about_to_touch(segments, pressure):
+def about_to_touch(segments: Sequence, pressure: float) -> Iterator[str]:
     """Segments whose estimated clearance the design has used up, in words."""
     for i, segment in enumerate(segments, start=1):
         left = gap_left(segment, pressure)

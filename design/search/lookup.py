@@ -5,11 +5,15 @@ All segments share one pressure, so the table is read pressure by pressure: at e
 angle and chamber height whose deformed active length turns most nearly as the piece asks, in rad.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pneunet.base.strains import RodStrains
 from pneunet.geometry.parameters import TWISTING as TWISTING_KIND
+from pneunet.geometry.parameters import Segment
+from pneunet.reduced.rod.laws import SegmentLaw
 
 HEIGHT_WEIGHT = 0.1  # rad per mm away from the start height: decides only between equals
 OUTSIDE = 1.0  # rad per width of what the law knows that an entry lies outside of it
@@ -26,19 +30,26 @@ class Guess:
     misfit: float
 
 
-def responses(strains, twisting):
+def responses(strains: RodStrains, twisting: bool) -> np.ndarray:
     """Stretch, curvature (1/mm) and twist (rad/mm) per deformed length, (3, ...), of RodStrains (..., 3)."""
     twist = strains.twist_per_deformed_length if twisting else strains.frenet_torsion
     return np.stack([strains.stretch, strains.frenet_curvature, twist])
 
 
-def count_for(segment, stretch, deformed_length):
+def count_for(segment: Segment, stretch: float, deformed_length: float) -> float:
     """Real number of chambers (>= 1) that makes a segment as long as asked when its active part is
     stretched."""
     return max(1.0, (deformed_length - 2 * segment.end_wall) / stretch / segment.pitch)
 
 
-def first_guesses(pieces, prototypes, angles, heights, pressures, law):
+def first_guesses(
+    pieces: Sequence,
+    prototypes: Sequence[Segment],
+    angles: list,
+    heights: list,
+    pressures: np.ndarray,
+    law: SegmentLaw,
+) -> list:
     """`Guess`es, best first, one for every pressure at which each piece has an entry.
 
     pieces: `Extracted`; prototypes: a Segment for each with its start dimensions; angles (deg) and heights

@@ -5,16 +5,18 @@ since a nearest point is no farther than the paired one, and unlike Eq. 27 it is
 that is too long.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
-from pneunet.design.target.curves import arc_lengths, evenly, nearest_points
 from pneunet.reduced.analytic.clearance import gap_left
-from pneunet.reduced.rod.centreline import centreline
+from pneunet.reduced.rod.centreline import Centreline, centreline
 from pneunet.reduced.rod.ends import free_manipulator
+from pneunet.reduced.rod.laws import SegmentLaw
 
 PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)
@@ -23,7 +25,7 @@ SPACING = 2.0  # mm between the samples of a trial's centreline
 STEP = 1e-5  # of a variable's range, for differences
 #: mm of misfit per mm that facing walls would overlap: contact is not in the law, so it is not designed into
 TOUCH = 5.0
-OUTSIDE = 20.0  # mm of misfit per width of what the law knows that a segment lies outside of it
+BEYOND = 20.0  # mm of misfit per width of what the law knows that a segment lies outside of it
 #: mm of misfit per range that a dimension leaves its start by: decides where the target does not
 PREFERENCE = 0.02
 
@@ -46,7 +48,7 @@ class Trial:
         self.segments = [replace(s, **change) for s, change in zip(problem.prototypes, changes)]
         self.rotation = problem.rotation @ se3.exp_rotation(problem.turns @ x[len(variables) :])
 
-    def centreline(self, law, base_point):
+    def centreline(self, law: SegmentLaw, base_point: np.ndarray) -> Centreline:
         """The Centreline from base_point (3,), mm."""
         pieces = free_manipulator(self.segments, law.each(self.segments, self.pressure), self.counts)
         return centreline(*pieces, SPACING, se3.make_pose(self.rotation, base_point))
@@ -71,18 +73,18 @@ class Problem:
     rotation: np.ndarray
     turns: np.ndarray
 
-    def residual(self, trial):
+    def residual(self, trial: Trial) -> np.ndarray:
         """Residual vector in mm whose squared norm is the cost in mm^2."""
         target = self.target
         line = trial.centreline(self.law, target.points[0])
         if self.objective == EQ27:
             misfits = [
-                (nearest_points(target.points, line.points) - target.points) / np.sqrt(len(target.points))
+                (Curve(line.points).nearest(target.points) - target.points) / np.sqrt(len(target.points))
             ]
         else:
             misfits = [self._paired(line)]
         misfits += [self._unseen_twists(trial), TOUCH * walls_overlap(trial.segments, trial.pressure)]
-        misfits += [OUTSIDE * self.law.excess(segment, trial.pressure) for segment in trial.segments]
+        misfits += [BEYOND * self.law.excess(segment, trial.pressure) for segment in trial.segments]
         return np.concatenate([m.ravel() for m in misfits])
 
     def _paired(self, line):
@@ -91,9 +93,9 @@ class Problem:
         target = self.target
         own = line.arc_length
         frames = line.at(np.interp(np.linspace(0, own[-1], PAIRS), own, line.s))
-        misfit = [frames[:, :3, 3] - evenly(target.points, PAIRS)]
+        misfit = [frames[:, :3, 3] - target.curve.evenly(PAIRS)]
         if target.frames is not None:
-            s = arc_lengths(target.points)
+            s = target.curve.arc_lengths
             nearest = np.abs(s[:, None] - np.linspace(0, s[-1], PAIRS)).argmin(axis=0)
             edges = self.prototypes[0].width / 2 * (frames[:, :3, 1:3] - target.frames[nearest][:, :, 1:3])
             misfit.append(edges.reshape(PAIRS, 6))
@@ -109,7 +111,7 @@ class Problem:
         return np.array(misfits)
 
 
-def walls_overlap(segments, pressure):
+def walls_overlap(segments: Sequence, pressure: float) -> np.ndarray:
     """By how much (mm) facing walls of each segment are expected to pass through each other; 0 where a gap
     stays."""
     return np.array([max(0.0, -gap_left(s, pressure)) for s in segments])
@@ -124,7 +126,7 @@ class Calls:
         self.preferred = [i for i, v in enumerate(variables) if v.start is not None]
         self.count, self.size = 0, 0
 
-    def attempt(self, x):
+    def attempt(self, x: np.ndarray) -> np.ndarray | None:
         """The residual (m,), or None where there is no such body or no equilibrium."""
         self.count += 1
         try:
@@ -136,11 +138,11 @@ class Calls:
         self.size = out.size
         return out
 
-    def residual(self, x):
+    def residual(self, x: np.ndarray) -> np.ndarray:
         out = self.attempt(x)
         return np.full(self.size, self.problem.target.length) if out is None else out
 
-    def jacobian(self, x):
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
         """One-sided differences, away from the upper bound or from where there is no equilibrium."""
         at = self.residual(x)
         columns = []

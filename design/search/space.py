@@ -1,12 +1,14 @@
 """The design space: start dimensions, what varies in each kind of segment, ranges that grow to castable
 limits."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.design.target.target import BENDING, TWISTING
+from pneunet.design.target.extraction import Extracted
+from pneunet.design.target.target import BENDING, TWISTING, Target
 from pneunet.geometry.parameters import ONE_SIDED, Segment
 from pneunet.geometry.parameters import TWISTING as TWISTING_KIND
 
@@ -48,12 +50,12 @@ class Variable:
     start: float | None = None  # a dimension's preferred value
 
     @property
-    def scale(self):
+    def scale(self) -> float:
         """What counts as a large change."""
         return max(self.high - self.low, 1e-3 * abs(self.value))
 
     @property
-    def bound(self):
+    def bound(self) -> float | None:
         """The end of the range that the value sits on, or None."""
         for end in (self.low, self.high):
             if abs(self.value - end) <= AT_BOUND * self.scale:
@@ -61,7 +63,7 @@ class Variable:
         return None
 
     @property
-    def grown(self):
+    def grown(self) -> "Variable":
         """With a wider range where the value sits on a bound that may grow; otherwise the same."""
         low, high = self.low, self.high
         if self.bound == low and low > self.least:
@@ -71,11 +73,11 @@ class Variable:
         return replace(self, low=low, high=high)
 
     @property
-    def title(self):
+    def title(self) -> str:
         return self.name if self.segment is None else f"segment {self.segment + 1} {self.name}"
 
     @property
-    def text(self):
+    def text(self) -> str:
         """The bound that the value sits on, in words."""
         unit, factor = UNITS.get(self.name, (" mm", 1.0))
         side = "lower" if self.bound == self.low else "upper"
@@ -83,7 +85,7 @@ class Variable:
         return f"{self.title} = {shown:.4g}{unit} ({side} bound)"
 
 
-def prototype(target, piece):
+def prototype(target: Target, piece: Extracted) -> Segment:
     """The Segment with a piece's start dimensions: material and shared dimensions are the same for all
     pieces."""
     kind = TWISTING_KIND if piece.kind == TWISTING else ONE_SIDED
@@ -93,7 +95,7 @@ def prototype(target, piece):
         raise InputError(f"[segment] (start dimensions of the {kind} segments): {error}") from None
 
 
-def limits(target, piece, segment):
+def limits(target: Target, piece: Extracted, segment: Segment) -> dict:
     """{name: (start range, limits)} of what varies in one segment; the user's bounds are limits at once."""
     ranges = RANGES[segment.kind]
     if target.vary is not None:
@@ -115,7 +117,7 @@ def _check_vary(vary, segment):
                 raise InputError(f"[vary]: {error}") from None
 
 
-def grid(limits, fixed, step):
+def grid(limits: tuple | None, fixed: float, step: float) -> Sequence[float]:
     """Values about `step` apart over a start range of `limits`; what does not vary has one value."""
     if limits is None:
         return [fixed]

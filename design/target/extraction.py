@@ -6,16 +6,17 @@ and search the one or two rates that are left. The placed arc also has frames, b
 segment bends, and the twist of a straight piece is the angle about it between the frames before and after.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from pneunet.base import se3
+from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.base.strains import RodStrains
-from pneunet.design.target.curves import arc_lengths, frenet, sample
-from pneunet.design.target.target import BENDING, HELICAL, TWISTING
+from pneunet.design.target.target import BENDING, HELICAL, TWISTING, Target
 
 FIT_POINTS = 31
 
@@ -51,11 +52,11 @@ class Extracted:
     note: str = ""
 
     @property
-    def strains(self):
+    def strains(self) -> RodStrains:
         """RodStrains of the wanted piece as an unstretched rod."""
         return RodStrains([1.0, 0, 0], [self.twist, self.curvature, 0.0])
 
-    def table(self):
+    def table(self) -> dict:
         """By file key; the paper's and Frenet's numbers by their own names."""
         out = {"kind": self.kind, "length_mm": self.length}
         if self.kind == TWISTING:
@@ -80,15 +81,15 @@ def _arc_points(s, curvature, twist):
     return se3.exp_pose(s[:, None] * _screw(curvature, twist))[:, :3, 3]
 
 
-def fit_arc(points, kind, curvature=None, twist=None):
+def fit_arc(points: np.ndarray, kind: str, curvature: float | None = None, twist: float | None = None) -> Arc:
     """The `Arc` of a kind nearest to points (n, 3), paired by arc length, with given rates kept.
 
     twisting: curvature 0; bending: torsion 0. The search starts from the median curvature and torsion of the
     points, and, for a helix, from both hands.
     """
-    length = arc_lengths(points)[-1]
+    curve = Curve.of(points)
+    length, wanted = curve.length, curve.evenly(FIT_POINTS)
     s = np.linspace(0, length, FIT_POINTS)
-    wanted = sample(points, s)
     weights = np.ones(FIT_POINTS)
     given_curvature = 0.0 if kind == TWISTING else curvature
     given_twist = 0.0 if kind in (TWISTING, BENDING) else twist
@@ -103,7 +104,7 @@ def fit_arc(points, kind, curvature=None, twist=None):
         arc = _arc_points(s, *rates(x))
         return (se3.transform(best_rigid_fit(arc, wanted, weights), arc) - wanted).ravel()
 
-    _, curvatures, torsions = frenet(points, length / 3)
+    _, curvatures, torsions = curve.frenet(length / 3)
     starts = [[]]
     if given_curvature is None:
         starts = [[length * np.median(curvatures)]]
@@ -126,21 +127,21 @@ def fit_arc(points, kind, curvature=None, twist=None):
     return Arc(float(length), float(c), float(t), pose[:3, :3], end[:3, :3], rms)
 
 
-def turn_about_axis(before, after):
+def turn_about_axis(before: np.ndarray, after: np.ndarray) -> float:
     """Angle in rad (-pi..pi) about the first axis that turns frame (3, 3) `before` into `after`."""
     R = before.T @ after
     return float(np.arctan2(R[2, 1] - R[1, 2], R[1, 1] + R[2, 2]))
 
 
-def extract(target, pieces):
+def extract(target: Target, pieces: Sequence) -> list[Extracted]:
     """The list of `Extracted` for the pieces of a target; the user's givens are kept where there are any."""
     ends = np.concatenate([[0.0], np.cumsum([p.length for p in pieces])])
-    own = arc_lengths(target.points)
+    own = target.curve.arc_lengths
     arcs = []
     for piece, low, high in zip(pieces, ends[:-1], ends[1:]):
         within = (own > low + 1e-6 * ends[-1]) & (own < high - 1e-6 * ends[-1])
         stations = np.concatenate([[low], own[within], [high]])
-        arcs.append(fit_arc(sample(target.points, stations), piece.kind, piece.curvature, piece.twist))
+        arcs.append(fit_arc(target.curve.at(stations), piece.kind, piece.curvature, piece.twist))
     out = [
         Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p))
         for p, arc in zip(pieces, arcs)
@@ -208,7 +209,7 @@ def _twist_of_run(target, pieces, arcs, run):
 
 def _twist_from_frames(target, piece, arc, low, high):
     """`Extracted` of a twisting piece from the turns about t1 between neighbouring frames."""
-    own = arc_lengths(target.points)
+    own = target.curve.arc_lengths
     turns = [turn_about_axis(a, b) for a, b in zip(target.frames, target.frames[1:])]
     angle = np.interp([low, high], own, np.concatenate([[0.0], np.cumsum(turns)]))
     twist, note = (angle[1] - angle[0]) / piece.length, "twist from the frames"

@@ -33,14 +33,20 @@ SHARED = ("width", "channel_width", "channel_height", "cavity_floor", "end_margi
 VARY_KEYS = {"angle_deg": "angle"} | {key: name for key, name in START_KEYS.items() if name not in SHARED}
 
 
-def read_target(path):
-    """The Target in a CSV of points or a TOML; InputError otherwise."""
+def read_target(path: str | Path) -> Target:
+    """The Target in a CSV of points or a TOML, or a shipped one by its name; InputError otherwise."""
     path = Path(path)
+    if (
+        path.name == str(path)
+        and not path.exists()
+        and f"{path}.toml" in {p.name for p in SHIPPED.glob("*.toml")}
+    ):
+        path = SHIPPED / f"{path}.toml"
     if path.suffix.lower() == ".toml":
         return _from_toml(path)
     if path.suffix.lower() == ".csv":
         points, frames = _read_points(path)
-        return _target(str(path), points=points, frames=frames, name=path.stem)
+        return _target(str(path), points=points, frames=frames, name=path.stem, source=path.name)
     if not path.exists():
         raise InputError(f"{path}: no such file")
     raise InputError(f"{path}: a target is a .csv of points in mm or a .toml")
@@ -138,6 +144,7 @@ def _from_toml(path):
         points=points,
         frames=frames,
         name=str(table.get("name", path.stem)),
+        source=path.name,
         pieces=_pieces(table.get("piece", []), where),
         base_direction=direction,
         base_width=width,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pneunet.design.target.curves import arc_lengths, evenly, nearest_points
+from pneunet.base.curve import Curve
 
 PAIRS = 201
 
@@ -28,15 +28,15 @@ class Errors:
     reference_length: float
 
     @property
-    def length_mismatch(self):
+    def length_mismatch(self) -> float:
         """Length of the curve minus that of the reference, mm."""
         return self.length - self.reference_length
 
-    def percent(self, distance):
+    def percent(self, distance: float) -> float:
         """A distance in mm as % of the reference's length."""
         return 100 * distance / self.reference_length
 
-    def table(self):
+    def table(self) -> dict[str, float]:
         """Everything by file key."""
         return {
             "rms_mm": self.rms,
@@ -53,7 +53,7 @@ class Errors:
             "length_mismatch_percent": self.percent(self.length_mismatch),
         }
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """The same for people, a line each."""
         return [
             f"RMS, paired by arc length  {self.rms:8.3f} mm   ({self.percent(self.rms):.2f} % of length)",
@@ -67,37 +67,34 @@ class Errors:
         ]
 
 
-def paired_rms(a, b, pairs=PAIRS):
-    """RMS distance in mm of polylines a (n, 3) and b (m, 3) paired at equal fractions of their own arc
-    lengths."""
-    return float(np.sqrt(np.mean(np.sum((evenly(a, pairs) - evenly(b, pairs)) ** 2, axis=1))))
+def paired_rms(a: Curve, b: Curve, pairs: int = PAIRS) -> float:
+    """RMS distance in mm of points paired at equal fractions of the curves' own arc lengths."""
+    return float(np.sqrt(np.mean(np.sum((a.evenly(pairs) - b.evenly(pairs)) ** 2, axis=1))))
 
 
-def eq27(points, curve):
-    """The paper's Eq. 27 in mm^2: sum of squared distances from points (n, 3) to a polyline (m, 3)."""
-    return float(np.sum((points - nearest_points(points, curve)) ** 2))
+def eq27(points: np.ndarray, curve: Curve) -> float:
+    """The paper's Eq. 27 in mm^2: sum of squared distances from points (n, 3) to a curve."""
+    return float(np.sum((points - curve.nearest(points)) ** 2))
 
 
-def hausdorff(a, b):
-    """Two-sided Hausdorff distance in mm of polylines, from the vertices of each to the segments of the
-    other."""
-    one_way = [np.linalg.norm(p - nearest_points(p, q), axis=1).max() for p, q in ((a, b), (b, a))]
+def hausdorff(a: Curve, b: Curve) -> float:
+    """Two-sided Hausdorff distance in mm, from the vertices of each curve to the lines of the other."""
+    one_way = [np.linalg.norm(p.points - q.nearest(p.points), axis=1).max() for p, q in ((a, b), (b, a))]
     return float(max(one_way))
 
 
-def compare(curve, reference):
-    """`Errors` of a polyline (m, 3) against a reference polyline (n, 3), both in mm and in the same
-    coordinates.
+def compare(curve: Curve | np.ndarray, reference: Curve | np.ndarray) -> Errors:
+    """`Errors` of a curve against a reference curve, both in mm and in the same coordinates.
 
     The reference is the target, or the finite element solution when a reduced prediction is judged.
     """
-    curve, reference = np.asarray(curve, float), np.asarray(reference, float)
+    curve, reference = Curve.of(curve), Curve.of(reference)
     return Errors(
         rms=paired_rms(curve, reference),
-        eq27=eq27(reference, curve),
-        eq27_points=len(reference),
+        eq27=eq27(reference.points, curve),
+        eq27_points=len(reference.points),
         hausdorff=hausdorff(curve, reference),
-        tip=float(np.linalg.norm(curve[-1] - reference[-1])),
-        length=float(arc_lengths(curve)[-1]),
-        reference_length=float(arc_lengths(reference)[-1]),
+        tip=float(np.linalg.norm(curve.points[-1] - reference.points[-1])),
+        length=curve.length,
+        reference_length=reference.length,
     )

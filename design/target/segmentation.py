@@ -9,7 +9,7 @@ off the arcs on either side.
 
 import numpy as np
 
-from pneunet.design.target.curves import arc_lengths, sample
+from pneunet.base.curve import Curve
 from pneunet.design.target.extraction import FIT_POINTS, fit_arc
 from pneunet.design.target.target import BENDING, HELICAL, TWISTING, Piece
 
@@ -24,9 +24,9 @@ NOTE = (
 )
 
 
-def split(points):
-    """The pieces (tuple of Piece, rates left open) of a curve (n, 3)."""
-    length = arc_lengths(points)[-1]
+def split(curve: Curve) -> tuple[Piece, ...]:
+    """The pieces (rates left open) of a Curve."""
+    length = curve.length
     shortest = min(SHORTEST, length)
     joints = np.linspace(0, length, min(GRID, max(2, int(length / shortest * 4))) + 1)
     best = [(0.0, None, None)] + [(np.inf, None, None)] * (len(joints) - 1)
@@ -34,7 +34,7 @@ def split(points):
         for i in range(j):
             if joints[j] - joints[i] < shortest - 1e-9 or not np.isfinite(best[i][0]):
                 continue
-            kind, cost = _kind_and_cost(points, joints[i], joints[j], length)
+            kind, cost = _kind_and_cost(curve, joints[i], joints[j], length)
             if best[i][0] + cost < best[j][0]:
                 best[j] = (best[i][0] + cost, i, kind)
     kinds, ends, j = [], [length], len(joints) - 1
@@ -42,35 +42,35 @@ def split(points):
         _, j, kind = best[j]
         kinds.insert(0, kind)
         ends.insert(0, joints[j])
-    ends = _refined(points, kinds, ends, joints[1], shortest, length)
+    ends = _refined(curve, kinds, ends, joints[1], shortest, length)
     return tuple(Piece(kind, high - low) for kind, low, high in zip(kinds, ends[:-1], ends[1:]))
 
 
-def _misfit(points, low, high, kind, length):
+def _misfit(curve, low, high, kind, length):
     """Mean square misfit of one piece in units of the tolerance, weighed by its share of the curve."""
-    arc = fit_arc(sample(points, np.linspace(low, high, FIT_POINTS)), kind)
+    arc = fit_arc(curve.at(np.linspace(low, high, FIT_POINTS)), kind)
     return (arc.rms / (TOLERANCE * length)) ** 2 * (high - low) / length
 
 
-def _kind_and_cost(points, low, high, length):
+def _kind_and_cost(curve, low, high, length):
     """The cheapest kind; richer ones are not tried where even a perfect fit would cost more."""
     best_kind, best = None, np.inf
     for kind, rates in RATES.items():
         if PRICE * rates >= best:
             break
-        cost = _misfit(points, low, high, kind, length) + PRICE * rates
+        cost = _misfit(curve, low, high, kind, length) + PRICE * rates
         if cost < best:
             best_kind, best = kind, cost
     return best_kind, best
 
 
-def _refined(points, kinds, ends, step, shortest, length):
+def _refined(curve, kinds, ends, step, shortest, length):
     """Joints moved by halves of the grid's step, down to 1/16, while that lowers the misfit of the two
     pieces."""
 
     def misfit(i):
-        return _misfit(points, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(
-            points, ends[i], ends[i + 1], kinds[i], length
+        return _misfit(curve, ends[i - 1], ends[i], kinds[i - 1], length) + _misfit(
+            curve, ends[i], ends[i + 1], kinds[i], length
         )
 
     ends = list(ends)

@@ -1,12 +1,14 @@
 """`Target`: what the user wants. Points in space, and what the user says about them beyond that."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
+from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, NeoHookean
-from pneunet.design.target.curves import arc_lengths
 
 TWISTING, BENDING, HELICAL = "twisting", "bending", "helical"
 LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
@@ -34,7 +36,7 @@ class Target:
     frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); pieces: the
     split; base_direction, base_width (3,): unit vectors that fix the base (width None = its roll stays free);
     pressure_range (low, high) in MPa, equal = fixed; material; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice.
+    Segment: (low, high)} or None for the default choice; source: name of the file that it was read from.
     """
 
     points: np.ndarray
@@ -47,6 +49,15 @@ class Target:
     material: NeoHookean = PAPER_TWISTING
     start: dict = field(default_factory=dict)
     vary: dict | None = None
+    source: str = ""
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Target":
+        """The Target in a CSV of points or a TOML (docs/use-design.md), or a shipped one by its name:
+        'octopus'. InputError that names key and fix otherwise."""
+        from pneunet.design.target.file import read_target
+
+        return read_target(path)
 
     def __post_init__(self):
         points = np.asarray(self.points, float)
@@ -58,12 +69,17 @@ class Target:
             object.__setattr__(self, "pieces", _fitted_to(self.pieces, self.length))
 
     @property
-    def length(self):
+    def length(self) -> float:
         """Arc length of the points' polyline, mm."""
-        return float(arc_lengths(self.points)[-1])
+        return self.curve.length
+
+    @cached_property
+    def curve(self) -> Curve:
+        """The points' polyline."""
+        return Curve(self.points)
 
     @property
-    def base_rotation(self):
+    def base_rotation(self) -> np.ndarray | None:
         """Rotation (3, 3) of a base that is fixed altogether, else None."""
         if self.base_width is None:
             return None
@@ -72,7 +88,7 @@ class Target:
         )
 
 
-def check_points(points):
+def check_points(points: np.ndarray) -> None:
     """InputError unless points are (n >= 4, 3), finite, without repeats and of a length that can be built."""
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"points must be rows of x, y, z in mm, not an array of shape {points.shape}")

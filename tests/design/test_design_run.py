@@ -6,7 +6,7 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.design.report.comparison import Comparison
-from pneunet.design.report.rundata import read_run
+from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.run import run_design
 from pneunet.design.target.metrics import compare
 from pneunet.geometry.designfile import read_design
@@ -71,7 +71,7 @@ def test_what_the_law_doubts_is_said_once_and_kept_or_refused(helix, tmp_path):
     design = run_design(helix, tmp_path / "out", Doubtful(), say=said.append)
     assert said.count("warning: segment 1: it is a toy") == 1
     assert design.result["doubts"] == ["segment 1: it is a toy"]
-    notes = Comparison.of(read_run(tmp_path / "out"), Doubtful()).notes
+    notes = Comparison.of(read_design_folder(tmp_path / "out"), Doubtful()).notes
     assert any("'toy'" in note and "segment 1: it is a toy" in note for note in notes)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pneunet.base import se3
+from pneunet.base.curve import Curve
 from pneunet.base.strains import helix_frenet
 from pneunet.design.target.extraction import extract, fit_arc, turn_about_axis
 from pneunet.design.target.file import SHIPPED, read_target
@@ -99,11 +100,11 @@ def test_frames_show_every_twist():
 
 
 def test_simple_split_of_the_octopus():
-    pieces = split(read_target(SHIPPED / "octopus.csv").points)
+    pieces = split(read_target(SHIPPED / "octopus.csv").curve)
     assert [p.kind for p in pieces] == ["twisting", "bending", "helical"]
     assert [p.length for p in pieces] == pytest.approx([50, 30, 100], abs=2)
 
 
 def test_simple_split_of_one_helix_is_one_piece():
-    pieces = split(rod((90, -0.02, 0.03))[:, :3, 3])
+    pieces = split(Curve(rod((90, -0.02, 0.03))[:, :3, 3]))
     assert [p.kind for p in pieces] == ["helical"]

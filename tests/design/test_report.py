@@ -9,14 +9,14 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.se3 import transform
 from pneunet.design.report.comparison import Comparison, overlaps, smooth, stopped_short, verdict
-from pneunet.design.report.rundata import read_run
+from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.target.metrics import compare
 from pneunet.reduced.model import AnalyticModel
 from tests.design.fake_run import FACTOR, HELIX, PLANE, POSE, make_run
 
 
 def judged(directory):
-    run = read_run(directory)
+    run = read_design_folder(directory)
     return run, Comparison.of(run, AnalyticModel())
 
 
@@ -47,7 +47,7 @@ def test_solution_that_stopped_short_is_compared_at_its_own_pressure(tmp_path):
 
 def test_solution_of_another_body_is_left_out_and_told(tmp_path):
     make_run(tmp_path, fields=False)
-    assert not read_run(tmp_path).stale
+    assert not read_design_folder(tmp_path).stale
     path = tmp_path / "design.toml"
     text = path.read_text()
     width = next(line for line in text.splitlines() if line.startswith("width_mm"))
@@ -94,7 +94,7 @@ def test_rest_state_alone_is_no_solution(tmp_path):
     make_run(tmp_path, fields=False)
     steps = tmp_path / "solve" / "steps.csv"
     steps.write_text("\n".join(steps.read_text().splitlines()[:2]) + "\n")
-    assert read_run(tmp_path).solve is None
+    assert read_design_folder(tmp_path).solve is None
 
 
 def test_report_page_is_whole_and_self_contained(tmp_path):

@@ -6,14 +6,15 @@ import time
 
 import pytest
 
-from pneunet import launch
+from pneunet.base.system import launch
 
+START = "import sys; from pneunet.base.system import launch; "
 SIZE = "from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)"
 
 
 def run(ranks, *command, **options):
     """launch.run in a process of its own, since it hands its standard streams on."""
-    code = f"import sys; from pneunet import launch; sys.exit(launch.run({ranks}, sys.argv[1:]))"
+    code = f"import sys; from pneunet.base.system import launch; sys.exit(launch.run({ranks}, sys.argv[1:]))"
     return subprocess.run(
         [sys.executable, "-c", code, *command], capture_output=True, text=True, timeout=120, **options
     )
@@ -64,9 +65,7 @@ def test_without_dashes_it_is_a_subcommand_of_pneunet():
 
 
 def test_started_from_within_an_mpi_rank():
-    inner = (
-        f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {SIZE!r}]))"
-    )
+    inner = START + f"sys.exit(launch.run(2, ['--', 'python', '-c', {SIZE!r}]))"
     outer = (
         f"import subprocess, sys; from mpi4py import MPI; subprocess.run([sys.executable, '-c', {inner!r}],"
         " check=True)"
@@ -86,9 +85,7 @@ def test_one_thread_a_rank_unless_the_user_says_otherwise(monkeypatch):
 def test_terminating_it_leaves_no_ranks_behind(tmp_path):
     beat = tmp_path / "beat"
     ranks = f"import time\nwhile True: open({str(beat)!r}, 'a').write('x'); time.sleep(0.05)"
-    code = (
-        f"import sys; from pneunet import launch; sys.exit(launch.run(2, ['--', 'python', '-c', {ranks!r}]))"
-    )
+    code = START + f"sys.exit(launch.run(2, ['--', 'python', '-c', {ranks!r}]))"
     process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 60
     while not beat.exists() and time.monotonic() < deadline:

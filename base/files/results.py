@@ -1,0 +1,73 @@
+"""What a run left in its folder, read back whatever kind of run it was."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.schemas import read_table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+#: folders in which a run keeps results below its own
+PARTS = ("shape", "solve", "cell")
+
+
+@dataclass(frozen=True, repr=False)
+class Results:
+    """record: what run.json says. tables: {name: structured array (rows,)}, units in the names of the fields;
+    a table of a folder below has the folder's name too: 'solve/steps'."""
+
+    directory: Path
+    record: dict
+    tables: dict[str, np.ndarray]
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())
+        return f"<Results of {self.directory}: {shown or 'no tables'}>"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """The table called so; the folder's name may be left out where only one fits."""
+        found = [key for key in self.tables if key == name or key.endswith(f"/{name}")]
+        if len(found) != 1:
+            known = ", ".join(self.tables) or "none"
+            raise InputError(f"{self.directory}: table '{name}' is not there: tables are {known}")
+        return self.tables[found[0]]
+
+    def frame(self, name: str) -> "DataFrame":
+        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        try:
+            from pandas import DataFrame
+        except ImportError:
+            raise InputError("pandas is missing: install it with: pip install pandas") from None
+        table = self[name]
+        return DataFrame({column: table[column] for column in table.dtype.names})
+
+
+def read_run(directory: str | Path) -> Results:
+    """The tables and run.json of a run's folder: of a design, shape, solve, cell, study or campaign.
+
+    InputError where there is neither.
+    """
+    directory, record, tables = Path(directory), {}, {}
+    for name in ("", *PARTS):
+        folder = directory / name
+        for path in sorted(folder.glob("*.csv")):
+            tables[f"{name}/{path.stem}" if name else path.stem] = read_table(path)
+        if (folder / "run.json").is_file():
+            told = _json(folder / "run.json")
+            record |= {name: told} if name else told
+    if not tables and not record:
+        raise InputError(f"{directory}: holds no tables (.csv) and no run.json: give the folder of a run")
+    return Results(directory, record, tables)
+
+
+def _json(path):
+    try:
+        return json.loads(path.read_text())
+    except (ValueError, OSError) as error:
+        raise InputError(f"{path}: cannot be read as JSON ({error})") from None

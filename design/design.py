@@ -1,0 +1,186 @@
+"""`Design`: a manipulator at its pressure, with what the reduced model says of it and the ways on from
+there."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import output_directory, write_csv
+from pneunet.base.files.record import write_record
+from pneunet.base.files.schemas import CENTRELINE, TARGET
+from pneunet.base.strains import RodStrains
+from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
+from pneunet.design.target.metrics import Errors, compare
+from pneunet.design.target.target import Target
+from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
+from pneunet.geometry.parameters import Manipulator
+from pneunet.reduced.choice import choose_law
+from pneunet.reduced.prediction import doubts, predict
+from pneunet.reduced.rod.centreline import Centreline
+from pneunet.reduced.rod.laws import SegmentLaw
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pneunet.design.report.rundata import Solution
+
+LARGEST_PRESSURE_KPA = 2000.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design:
+    """What to cast, and at what pressure.
+
+    content: what design.toml says. law: what predicts. target: what was wanted, if anything was.
+    active_bounds, widened_ranges: of the search, in words. effort: what run.json says of the search.
+    """
+
+    content: DesignFile
+    law: SegmentLaw = field(default_factory=choose_law)
+    target: Target | None = None
+    active_bounds: tuple[str, ...] = ()
+    widened_ranges: tuple[str, ...] = ()
+    effort: dict = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        manipulator: Manipulator,
+        *,
+        pressure_kPa: float,
+        name: str = "design",
+        law: str | SegmentLaw = "trained",
+        mesh_size_mm: float = 2.0,
+    ) -> "Design":
+        """A Manipulator made by hand at a pressure. law: 'trained', 'analytic' or a law's file (.npz)."""
+        pressure = checked_kPa(pressure_kPa)
+        content = DesignFile(manipulator, pressure * MPA_PER_KPA, name=name, mesh_size=mesh_size_mm)
+        return cls(content, chosen_law(law))
+
+    @classmethod
+    def read(cls, path: str | Path, law: str | SegmentLaw | None = None) -> "Design":
+        """The design in a design.toml, or in the folder that holds one; law: by default the one it was
+        designed with. InputError where there is none."""
+        from pneunet.design.report.rundata import read_design_folder
+
+        path = Path(path)
+        if path.name != "design.toml" and not path.is_dir():
+            return cls(read_design_file(path), chosen_law("trained" if law is None else law))
+        folder = read_design_folder(path if path.is_dir() else path.parent)
+        target = None if folder.target is None else Target(folder.target, folder.design.name)
+        return cls(folder.design, chosen_law(folder.law if law is None else law), target)
+
+    def __repr__(self) -> str:
+        m = self.manipulator
+        told = f"{len(m.segments)} segments, {m.length:.1f} mm, {self.pressure_kPa:.4g} kPa"
+        if self.errors:
+            told += f"; RMS {self.errors.rms:.2f} mm ({self.errors.percent(self.errors.rms):.2f} %)"
+        return f"<Design {self.content.name}: {told}; {len(self.doubts)} doubts>"
+
+    @property
+    def manipulator(self) -> Manipulator:
+        """What is cast."""
+        return self.content.manipulator
+
+    @property
+    def pressure_kPa(self) -> float:
+        """The design's pressure."""
+        return self.content.pressure * KPA_PER_MPA
+
+    @cached_property
+    def prediction(self) -> Centreline:
+        """The Centreline at the design's pressure, in the target's coordinates."""
+        return self._predicted(self.content.pressure)
+
+    @cached_property
+    def errors(self) -> Errors | None:
+        """How far the prediction is from the target; None without one."""
+        return self.target and compare(self.prediction.points, self.target.curve)
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons, one a line, not to trust the law at the design's pressure."""
+        return doubts(self.manipulator, self.content.pressure, self.law)
+
+    @cached_property
+    def strains(self) -> RodStrains:
+        """RodStrains (segments, 3) of the segments' active parts at the design's pressure."""
+        return self.law.each(self.manipulator.segments, self.content.pressure)
+
+    def predict(self, pressures_kPa: float | Iterable[float]) -> Centreline | list[Centreline]:
+        """The Centreline at a pressure, or a list of them at several; ConvergenceError where the law has no
+        equilibrium."""
+        if np.ndim(pressures_kPa) == 0:
+            return self._predicted(checked_kPa(pressures_kPa) * MPA_PER_KPA)
+        return [self._predicted(checked_kPa(p) * MPA_PER_KPA) for p in pressures_kPa]
+
+    def _predicted(self, pressure):
+        return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)
+
+    def save(self, directory: str | Path) -> Path:
+        """Write design.toml, centreline.csv, run.json, with a target target.csv and with matplotlib
+        design.png; the folder."""
+        directory = output_directory(directory)
+        content, line = self.content, self.prediction
+        if self.target is not None:
+            write_csv(directory / "target.csv", TARGET, self.target.points)
+            content = replace(content, target="target.csv")
+        write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
+        write_design_file(directory / "design.toml", content)
+        versions = {"numpy": np.__version__, "scipy": scipy.__version__}
+        inputs = {"law": self.law.name} | self.effort.get("inputs", {})
+        record = {"inputs": inputs, "versions": versions, "doubts": list(self.doubts)}
+        write_record(directory, **{**self.effort, **record})
+        self.draw(directory / "design.png")
+        return directory
+
+    def plot(self) -> "Figure":
+        """A matplotlib figure of target and prediction, with errors and segments."""
+        from pneunet.design.report.pictures import design_figure
+
+        return design_figure(self)
+
+    def draw(self, path: str | Path) -> bool:
+        """Write the figure as a PNG; False, with a line in the log, without matplotlib."""
+        from pneunet.design.report.pictures import draw_design
+
+        return draw_design(self, path)
+
+    def solve(
+        self,
+        directory: str | Path,
+        *,
+        ranks: int = 1,
+        pressure_kPa: float | None = None,
+        mesh_size_mm: float | None = None,
+        fields: bool = True,
+        resume: bool = False,
+    ) -> "Solution":
+        """Finite elements of the whole body in processes of their own; the folder gets what `pneunet solve`
+        writes.
+
+        pressure_kPa, mesh_size_mm: instead of the design's. fields: ParaView files too. resume: go on from
+        the last accepted step of a run that was ended. Progress is shown line by line. InputError on bad
+        input, ConvergenceError (with everything accepted on disk) where the pressure cannot be reached.
+        """
+        from pneunet.design.chain import solve
+
+        return solve(self, directory, ranks, pressure_kPa, mesh_size_mm, fields, resume)
+
+
+def chosen_law(law: str | SegmentLaw) -> SegmentLaw:
+    """A law by its name or file, or as it is."""
+    return choose_law(law) if isinstance(law, str) else law
+
+
+def checked_kPa(pressure: float) -> float:
+    """A pressure in kPa; InputError where it is none that silicone bears."""
+    if not 0 <= float(pressure) <= LARGEST_PRESSURE_KPA:
+        raise InputError(f"pressure_kPa = {pressure:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
+    return float(pressure)

@@ -1,0 +1,196 @@
+"""The command line's grammar: sub-commands, their arguments and what may stand for them."""
+
+import argparse
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from pneunet.base.errors import InputError
+
+LARGEST_PRESSURE_KPA = 2000.0
+
+
+class Parser(argparse.ArgumentParser):
+    """Errors are InputErrors; --pressure is not taken for --pressure-kPa: the unit is part of the name."""
+
+    def __init__(self, **options):
+        super().__init__(**options, allow_abbrev=False)
+
+    def error(self, message: str):
+        raise InputError(f"{message} ({self.prog} --help tells more)")
+
+
+def pressures(text: str) -> list[float]:
+    """kPa of a comma-separated list."""
+    values = []
+    for word in text.split(","):
+        try:
+            value = float(word)
+        except ValueError:
+            raise argparse.ArgumentTypeError(
+                f"'{word}' is not a number; write for instance 10,20,30"
+            ) from None
+        if not 0 < value <= LARGEST_PRESSURE_KPA:
+            raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
+        values.append(value)
+    return values
+
+
+def one_pressure(text: str) -> float:
+    """kPa; 0 is for loads alone."""
+    if text.strip() == "0":
+        return 0.0
+    values = pressures(text)
+    if len(values) != 1:
+        raise argparse.ArgumentTypeError("one number is wanted here")
+    return values[0]
+
+
+def _number(text: str, low: float, high: float, said: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(f"'{text}' must be a number {said}")
+    return value
+
+
+def mesh_size(text: str) -> float:
+    """mm"""
+    return _number(text, 0.1, 20, "in 0.1..20")
+
+
+def strain_percent(text: str) -> float:
+    """Larger than 0."""
+    return _number(text, math.ulp(0.0), math.inf, "larger than 0")
+
+
+def whole(text: str) -> int:
+    """1 to 20000"""
+    if not text.isdecimal() or not 0 < int(text) <= 20_000:
+        raise argparse.ArgumentTypeError(f"'{text}' must be a whole number in 1..20000")
+    return int(text)
+
+
+def parser(functions: Mapping[str, Callable]) -> Parser:
+    """The parser; functions: {command: what is called with its arguments}."""
+    top = Parser(
+        prog="pneunet",
+        description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.",
+    )
+    top.add_argument("--version", action="store_true", help="name, version and revision")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", parser_class=Parser)
+
+    def add(name, text):
+        command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(function=functions[name])
+        return command.add_argument
+
+    def add_law(argument, default):
+        text = "trained (the rod law that comes along), analytic, or the .npz of pneunet train"
+        text += f"; default: {default or 'as designed'}"
+        argument("--law", default=default, metavar="LAW", help=text)
+
+    def add_outside(argument):
+        text = "where the law doubts the design; default: warn"
+        argument("--outside", choices=("warn", "refuse"), default="warn", help=text)
+
+    def add_output(argument, default, metavar="DIR"):
+        argument("-o", "--output", type=Path, metavar=metavar, help=f"default: {default}")
+
+    def add_retry(argument):
+        text = "compute again what crashed, ran out of time or memory"
+        argument("--retry", action="store_true", help=text)
+
+    finished = "; finished cases there are kept"
+
+    a = add("design", "inverse design: target curve (CSV or TOML) -> design.toml, centreline.csv, design.png")
+    a("target", type=Path, help="a file, or the name of a shipped target: octopus, tentacle2, vase, pear")
+    add_law(a, "trained")
+    add_outside(a)
+    add_output(a, "out/NAME of the target")
+
+    a = add("shape", "reduced model only: centrelines, 3D body, picture and animation")
+    a("design", type=Path)
+    text = "default: five steps to the design's"
+    a("--pressure-kPa", type=pressures, dest="pressures", metavar="10,20,...", help=text)
+    add_law(a, "trained")
+    add_outside(a)
+    add_output(a, "the design's folder")
+
+    a = add("mesh", "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
+    a("design", type=Path)
+    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    add_output(a, "the design's folder")
+
+    text = "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml"
+    a = add("solve", text)
+    a("design", type=Path)
+    text = "default: the design's; 0: its [loads] alone"
+    a("--pressure-kPa", type=one_pressure, dest="pressure", help=text)
+    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    a("--no-fields", action="store_true", help="write no ParaView files")
+    text = "go on from the last accepted step of a run that was ended, on any ranks"
+    a("--resume", action="store_true", help=text)
+    add_output(a, "the design's folder")
+
+    text = "one pitch of a long segment: strains, volume and rod stiffness over pressure, or at given strains"
+    a = add("cell", text)
+    a("cell", type=Path, metavar="CELL.toml")
+    add_output(a, "the file's folder")
+
+    text = "cells, segments or manipulators over a grid or a list"
+    text += "; on MPI ranks: pneunet run -n 3 study STUDY.toml"
+    a = add("study", text)
+    a("study", type=Path, metavar="STUDY.toml")
+    add_retry(a)
+    add_output(a, f"out/NAME of the study{finished}")
+
+    text = (
+        "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml"
+    )
+    a = add("campaign", text)
+    a("campaign", type=Path, metavar="CAMPAIGN.toml")
+    text = "a data set whose cases are taken over, not computed again"
+    a("--extend", type=Path, metavar="DATA.npz", help=text)
+    add_retry(a)
+    add_output(a, f"out/NAME of the campaign{finished}")
+
+    a = add("suggest", "further designs for a campaign: those that would teach the rod law most")
+    a("campaign", type=Path, metavar="CAMPAIGN.toml")
+    a("--kind", choices=("one-sided", "twisting"), required=True)
+    a("-n", "--number", type=whole, default=100, metavar="100", help="how many; default: 100")
+    text = "of how many designs that follow in the sample; default: 2000"
+    a("--of", type=whole, default=2000, metavar="2000", help=text)
+    text = "by the bending stiffness of cells whose walls touch, not by the free strains"
+    a("--touching", action="store_true", help=text)
+    text = "of pneunet train; default: the one that comes along"
+    a("--law", default="trained", metavar="LAW.npz", help=text)
+
+    a = add("train", "the rod law from a data set of cells, with its errors on held-out designs")
+    a("data", type=Path, metavar="DATA.npz")
+    text = "keep the metrics and noises of this law: for data that have grown"
+    a("--like", type=Path, metavar="LAW.npz", help=text)
+    a("--no-comparison", action="store_true", help="leave out the other laws and the learning curve")
+    add_output(a, "law.npz beside the data; tables get the same name with .md", "LAW.npz")
+
+    a = add("report", "one HTML page: target, reduced prediction and finite elements side by side")
+    a("directory", type=Path)
+    add_law(a, None)
+
+    a = add("fit-material", "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
+    a("test", type=Path, metavar="TENSILE.csv")
+    text = "neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them"
+    a("--law", default="all", help=text)
+    a("--stress-unit", help="where the file names none: MPa, kPa, Pa, psi")
+    text = "fit no further than this"
+    a("--to-strain-percent", type=strain_percent, default=math.inf, metavar="200", help=text)
+    add_output(a, "out/fit-NAME of the test")
+
+    a = add("run", "start a pneunet command (or, after --, any program) on N MPI ranks")
+    a("-n", "--ranks", type=int, required=True)
+    a("rest", nargs=argparse.REMAINDER, metavar="COMMAND ...")
+
+    add("doctor", "check this installation and say what to fix")
+    return top

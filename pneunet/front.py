@@ -1,0 +1,83 @@
+"""Functions of the front door that name units where the rooms behind it have one consistent system (mm,
+MPa)."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pneunet.base.files.toml import from_table
+from pneunet.base.materials.laws import Hyperelastic, material_from_table
+from pneunet.base.units import MPA_PER_KPA
+from pneunet.design.design import Design, checked_kPa, chosen_law
+from pneunet.design.report.report import write_report
+from pneunet.geometry.designfile import segment_from_table
+from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.reduced import prediction
+from pneunet.reduced.rod.centreline import Centreline
+from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.rod import Rod
+
+
+def segment(material: Hyperelastic | None = None, **keys: object) -> Segment:
+    """A Segment from a design.toml's keys: segment(kind="one-sided", angle_deg=60, chambers=8, width_mm=12).
+
+    material: by default the paper's. InputError that names key and fix otherwise.
+    """
+    return segment_from_table(keys, "segment", material or Segment.material)
+
+
+def material(**keys: object) -> Hyperelastic:
+    """A material from a design.toml's keys: material(law="Yeoh", c10_MPa=0.1, c20_MPa=0.01) or
+    material(silicone="Ecoflex 00-30")."""
+    return material_from_table(keys, "material")
+
+
+def loads(**keys: object) -> DeadLoads:
+    """Dead loads from a design.toml's keys: loads(gravity_m_per_s2=[0, 0, -9.81], tip_force_N=[0, 0,
+    -0.1])."""
+    return from_table(DeadLoads, keys, "loads")
+
+
+def read_design(path: str | Path, law: str | None = None) -> Design:
+    """The Design in a design.toml or in its folder; law: by default the one that it was designed with."""
+    return Design.read(path, law)
+
+
+def predict(
+    manipulator: Manipulator,
+    *,
+    pressure_kPa: float,
+    law: str | SegmentLaw = "trained",
+    base_pose: np.ndarray | None = None,
+) -> Centreline:
+    """The Centreline (mm) of a free Manipulator at a pressure; base_pose (4, 4): frame of its base.
+
+    law: 'trained', 'analytic', a law's file (.npz) or a SegmentLaw.
+    """
+    pressure = checked_kPa(pressure_kPa) * MPA_PER_KPA
+    return prediction.predict(manipulator, pressure, chosen_law(law), base_pose=base_pose)
+
+
+def rod(
+    manipulator: Manipulator,
+    *,
+    pressure_kPa: float | list[float],
+    law: str | SegmentLaw = "trained",
+    base_pose: np.ndarray | None = None,
+) -> Rod:
+    """The Rod of a Manipulator, which carries loads: rod(...).equilibrium(pn.loads(tip_force_N=[0, 0,
+    -0.1])).
+
+    pressure_kPa: one for all segments, or one for each.
+    """
+    many = np.ndim(pressure_kPa) > 0
+    pressure = [checked_kPa(p) * MPA_PER_KPA for p in np.atleast_1d(pressure_kPa)]
+    chosen = chosen_law(law)
+    laws = [chosen.of(each) for each in manipulator.segments]
+    return Rod.of(manipulator, laws, pressure if many else pressure[0], base_pose)
+
+
+def report(directory: str | Path, law: str | None = None) -> Path:
+    """Write one HTML page of what a design's folder holds; its path. law: by default that of the design."""
+    return write_report(directory, chosen_law(law) if law else None)

@@ -1,0 +1,114 @@
+"""The front door: one import, names that load when asked for, units in arguments, the README's five lines."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pneunet as pn
+from pneunet.geometry.parameters import Segment
+
+ROOT = Path(__file__).resolve().parents[2]
+FINGER = pn.Manipulator((Segment("one-sided", 90.0, 8),))
+
+
+def fenced(path):
+    """The first block of Python in a Markdown file."""
+    return re.search(r"```python\n(.*?)```", path.read_text(), re.S).group(1)
+
+
+@pytest.fixture
+def curve(tmp_path):
+    """A helix that one segment can follow, as a CSV in an empty folder."""
+    points = pn.predict(pn.Manipulator((Segment("one-sided", 65.0, 10),)), pressure_kPa=35).points
+    np.savetxt(tmp_path / "curve.csv", points, "%.4f", ",", header="x_mm,y_mm,z_mm", comments="")
+    return tmp_path / "curve.csv"
+
+
+def test_the_readmes_five_lines(curve, monkeypatch, capsys):
+    """As they stand there, finite elements included: on the coarsest mesh, by a key of the saved design."""
+    monkeypatch.chdir(curve.parent)
+    lines = fenced(ROOT / "README.md")
+    assert "pn.inverse_design(target)" in lines and 'design.solve("out/mine", ranks=2)' in lines
+    names = {}
+    exec(lines.replace("ranks=2", "ranks=2, pressure_kPa=5, mesh_size_mm=4, fields=False"), names)
+    design, solved = names["design"], names["solved"]
+    assert len(names["lines"]) == 3 and design.errors.rms < 1.0 and "design curve" in repr(design).lower()
+    assert solved.pressure_kPa == pytest.approx(5) and np.linalg.norm(solved.tip) > 20
+    assert solved.steps["pressure_kPa"][-1] == pytest.approx(5)
+    assert "step " in capsys.readouterr().out  # progress is shown
+    assert (curve.parent / "out/mine/report.html").is_file()
+    again = pn.read_run("out/mine")
+    assert {"centreline", "solve/steps", "solve/segments"} <= set(again.tables)
+    assert again["steps"]["tip_x_mm"][-1] == pytest.approx(solved.tip[0])
+    read = pn.read_design("out/mine")
+    assert np.allclose(read.prediction.points, design.prediction.points, atol=1e-9)
+
+
+def test_inverse_design_writes_and_prints_nothing(curve, monkeypatch, capsys, tmp_path_factory):
+    empty = tmp_path_factory.mktemp("empty")
+    monkeypatch.chdir(empty)
+    design = pn.inverse_design(np.loadtxt(curve, delimiter=",", skiprows=1), law="analytic")
+    assert not list(empty.iterdir()) and capsys.readouterr() == ("", "")
+    assert design.errors.rms < 1.5 and isinstance(design.doubts, tuple) and design.active_bounds is not None
+    assert "target" in design.plot().axes[0].get_legend_handles_labels()[1]
+
+
+def test_importing_it_costs_nothing():
+    code = "import sys, pneunet; print(sorted({n.split('.')[0] for n in sys.modules} & {'numpy', 'scipy'}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_name_is_there_and_has_a_docstring():
+    for name in pn.__all__:
+        assert getattr(pn, name).__doc__, name
+    assert set(pn.__all__) <= set(dir(pn))
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        pn.nonsense  # noqa: B018
+
+
+def test_a_bare_number_is_no_pressure():
+    """30 could be MPa: the argument's name says kPa, and must be written."""
+    with pytest.raises(TypeError):
+        pn.predict(FINGER, 30)
+    with pytest.raises(pn.InputError, match="pressure_kPa = 30000 must lie in 0..2000 kPa"):
+        pn.predict(FINGER, pressure_kPa=30_000)
+    from pneunet.reduced import predict, shipped_law
+
+    with pytest.raises(pn.InputError, match="in MPa"):
+        predict(FINGER, 30, shipped_law())
+
+
+def test_a_manipulator_made_by_hand_goes_the_same_way(tmp_path):
+    design = pn.Design.of(FINGER, pressure_kPa=20, name="finger")
+    one, two = design.predict([10, 20])
+    assert np.allclose(two.points, design.prediction.points) and not np.allclose(one.points, two.points)
+    assert design.errors is None and design.pressure_kPa == pytest.approx(20)
+    assert pn.read_design(design.save(tmp_path / "a b")).manipulator == FINGER
+
+
+def test_file_keys_are_arguments():
+    segment = pn.segment(kind="one-sided", angle_deg=60, chambers=5, material=pn.silicone("Ecoflex 00-30"))
+    assert segment.angle == 60 and segment.material.mu == pytest.approx(pn.silicone("Ecoflex 00-30").mu)
+    assert pn.loads(gravity_m_per_s2=[0, 0, -9.81]).gravity == (0.0, 0.0, -9810.0)
+    with pytest.raises(pn.InputError, match="unknown key 'angel_deg'.*did you mean 'angle_deg'"):
+        pn.segment(kind="one-sided", angel_deg=60, chambers=5)
+
+
+def test_a_rod_carries_load():
+    rod = pn.rod(FINGER, pressure_kPa=20)
+    free = pn.predict(FINGER, pressure_kPa=20)
+    assert np.allclose(rod.free().points[-1], free.points[-1], atol=1e-9)
+    loaded = rod.equilibrium(pn.loads(tip_force_N=[0, 0, -0.02]))
+    assert loaded.tip[2, 3] < free.points[-1, 2]
+
+
+def test_the_examples_script_runs(tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / "tour.py")], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
