@@ -88,11 +88,11 @@ DRAW = (
     "assert (plotter.screenshot()[32, 32] == (255, 0, 0)).all(), 'the picture is not what was drawn'\n"
     "print(type(plotter.render_window).__name__)"
 )
-RANKS = (
-    "import sys; from pneunet.base.system import launch\n"
-    "code = 'from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)'\n"
-    "sys.exit(launch.run(2, ['--', sys.executable, '-c', code]))"
-)
+RANKS = """import sys
+from pneunet.base.system import launch
+code = "from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)"
+sys.exit(launch.run(2, ["--", sys.executable, "-c", code]))
+"""
 
 
 def probe(code: str, **env: str) -> tuple[bool, str]:
