@@ -21,7 +21,7 @@ from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.choice import choose_law
-from pneunet.reduced.prediction import doubts, predict
+from pneunet.reduced.rod.prediction import doubts, predict
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
 

@@ -16,7 +16,7 @@ from pneunet.design.report.labels import plain
 from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import read_design_file
 from pneunet.reduced.choice import choose_law
-from pneunet.reduced.prediction import doubts, predict
+from pneunet.reduced.rod.prediction import doubts, predict
 from pneunet.reduced.rod.laws import SegmentLaw
 
 log = logging.getLogger(__name__)

@@ -13,7 +13,7 @@ from pneunet.design.report.report import write_report
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced import prediction
+from pneunet.reduced.rod import prediction
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.rod import Rod

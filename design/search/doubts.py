@@ -12,7 +12,7 @@ log = logging.getLogger(__name__)
 
 
 def tell_doubts(doubts: Sequence[str], law: SegmentLaw, outside: str) -> None:
-    """Say a law's doubts (reduced.prediction.doubts) about a manipulator; InputError where they are
+    """Say a law's doubts (reduced.rod.prediction.doubts) about a manipulator; InputError where they are
     refused."""
     if outside not in WAYS:
         raise InputError(f"outside = '{outside}' is not known: write {' or '.join(WAYS)}")
