@@ -11,6 +11,7 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
+from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.tags import AIR, GAP
 
@@ -63,9 +64,9 @@ def _build(segment, half, cut, gaps):
                 )
             )
     solids = []
-    for tags, unify in ((outer, True), (inner, False)):
+    for blocks, unify in ((outer, True), (inner, False)):
         slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
-        solids.append(occ.intersect(cad.fuse(tags, unify), [(3, slab)])[0])
+        solids.append(occ.intersect(cad.fuse(blocks, unify), [(3, slab)])[0])
     layer = [(3, tag) for tag in cad.layer_solid(s, -half, half)]
     medium = _gap_solids(s, half, centres[:-1] + s.pitch / 2) if gaps else []
     _, parents = occ.fragment(solids[0], solids[1] + layer + medium)
