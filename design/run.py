@@ -9,11 +9,12 @@ import scipy
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import output_directory, require_writable, write_csv
 from pneunet.base.files.record import write_record
+from pneunet.base.files.schemas import CENTRELINE, TARGET
 from pneunet.design.search.doubts import WARN, told_doubts
 from pneunet.design.search.inverse import solve
 from pneunet.design.search.problem import OBJECTIVES, PAIRED
 from pneunet.design.target.extraction import extract
-from pneunet.design.target.file import POINT_COLUMNS, read_target
+from pneunet.design.target.file import read_target
 from pneunet.design.target.metrics import compare
 from pneunet.design.target.segmentation import NOTE, split
 from pneunet.design.target.target import HELICAL, TWISTING
@@ -71,8 +72,8 @@ def run_design(target_path, directory, law=None, objective=PAIRED, say=print, ou
         result=result,
     )
     directory = output_directory(directory)
-    write_csv(directory / "target.csv", POINT_COLUMNS, target.points)
-    write_csv(directory / "centreline.csv", ("s_mm", *POINT_COLUMNS), np.column_stack([line.s, line.points]))
+    write_csv(directory / "target.csv", TARGET, target.points)
+    write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
     write_design(directory / "design.toml", design)
     seconds = time.perf_counter() - started
     write_record(

@@ -8,6 +8,7 @@ import numpy as np
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import atomic_path, output_directory, write_csv
 from pneunet.base.files.record import write_record
+from pneunet.base.files.schemas import SHAPES
 from pneunet.design.report.labels import plain
 from pneunet.design.search.doubts import WARN, told_doubts
 from pneunet.geometry.designfile import read_design
@@ -47,7 +48,7 @@ def run_shape(design_path, pressures, directory, say=print, law=None, outside=WA
         raise ConvergenceError(f"no shape at {_list(failed)} kPa: {next(iter(failed.values()))}")
     write_csv(
         folder / "centrelines.csv",
-        ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"],
+        SHAPES,
         [[p * 1e3, s, *point] for p, line in shapes.items() for s, point in zip(line.s, line.points)],
     )
     say(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")

@@ -316,7 +316,7 @@ def run_mesh(a):
 
     design = read_design(a.design)
     folder = output_directory(design_folder(a)) / "mesh"
-    mesh_manipulator(design.manipulator, a.mesh_size_mm or design.mesh_size, folder, say)
+    mesh_manipulator(design.manipulator, a.mesh_size_mm or design.mesh_size, folder)
     say(f"written: {folder / 'manipulator.msh'}, manipulator.step, mesh.json")
 
 
@@ -326,27 +326,25 @@ def run_solve(a):
     design = read_design(a.design)
     from pneunet.hifi.runs.solve.solve import solve_design
 
-    solve_design(
-        design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, say=say, resume=a.resume
-    )
+    solve_design(design, design_folder(a), a.mesh_size_mm, a.pressure, not a.no_fields, resume=a.resume)
 
 
 def run_cell(a):
-    from pneunet.hifi.cell.run import run_cell as work
+    from pneunet.hifi.runs.cell import run_cell as work
 
-    work(a.cell, a.output or a.cell.parent, say=say)
+    work(a.cell, a.output or a.cell.parent)
 
 
 def run_study(a):
     from pneunet.hifi.runs.study.study import run_study as work
 
-    work(a.study, a.output or Path("out") / a.study.stem, say=say, retry=a.retry)
+    work(a.study, a.output or Path("out") / a.study.stem, retry=a.retry)
 
 
 def run_campaign(a):
     from pneunet.hifi.runs.campaign.campaign import run_campaign as work
 
-    work(a.campaign, a.output or Path("out") / a.campaign.stem, say=say, retry=a.retry, extend=a.extend)
+    work(a.campaign, a.output or Path("out") / a.campaign.stem, retry=a.retry, extend=a.extend)
 
 
 def run_suggest(a):

@@ -10,6 +10,7 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_csv
+from pneunet.base.files.schemas import TARGET
 from pneunet.base.files.toml import file_key, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
 from pneunet.base.strains import helix_frenet
@@ -19,7 +20,6 @@ from pneunet.geometry.parameters import Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
-POINT_COLUMNS = ("x_mm", "y_mm", "z_mm")
 FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
 
 #: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
@@ -71,15 +71,15 @@ def _read_points(path):
     if all(_is_number(cell) for cell in header):
         if len(header) != 3:
             raise InputError(f"{path}: a CSV without a header has 3 columns x, y, z in mm, not {len(header)}")
-        header, rows, skipped = list(POINT_COLUMNS), [first, *rows], 0
+        header, rows, skipped = list(TARGET), [first, *rows], 0
     else:
         skipped = 1
-        refuse_unknown(dict.fromkeys(header), [*POINT_COLUMNS, *FRAME_COLUMNS], f"{path} header")
+        refuse_unknown(dict.fromkeys(header), [*TARGET, *FRAME_COLUMNS], f"{path} header")
     values = _numbers(path, header, rows, skipped)
-    missing = [c for c in POINT_COLUMNS if c not in values]
+    missing = [c for c in TARGET if c not in values]
     if missing:
         raise InputError(f"{path}: column '{missing[0]}' is missing")
-    points = np.column_stack([values[c] for c in POINT_COLUMNS])
+    points = np.column_stack([values[c] for c in TARGET])
     return points, _frames_of(values, path) if "t1x" in values or "t2x" in values else None
 
 

@@ -1,6 +1,7 @@
 """Tagged tetrahedral mesh of a manipulator, with the checks that make a mesh fit for use."""
 
 import json
+import logging
 import os
 import time
 from contextlib import contextmanager
@@ -15,8 +16,10 @@ from pneunet.base.files.toml import to_table
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
 
+log = logging.getLogger(__name__)
 
-def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
+
+def mesh_manipulator(manipulator, mesh_size, directory):
     """Write manipulator.msh, manipulator.step and mesh.json to `directory`; return the content of mesh.json.
 
     mesh_size in mm (tetrahedron edge). Raises InputError when gmsh cannot mesh it or a check fails; nothing
@@ -32,7 +35,7 @@ def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
     with cad.session():
         try:
             volumes = cad.build(manipulator)
-            say(
+            log.info(
                 f"CAD: body {volumes['body_mm3']:.1f} mm3, cavity {volumes['cavity_mm3']:.1f} mm3"
                 f" ({time.perf_counter() - started:.1f} s)"
             )
@@ -61,7 +64,7 @@ def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
             gmsh.write(str(temporary))
     facts["seconds"] = time.perf_counter() - started
     write_text(directory / "mesh.json", json.dumps(facts, indent=1) + "\n")
-    say(
+    log.info(
         f"mesh: {facts['cells']} cells, {facts['vertices']} vertices, cavity closed, smallest quality"
         f" {facts['smallest_quality']:.2f}"
     )

@@ -3,13 +3,13 @@
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry import tags
 from pneunet.hifi.contact.walls import CellWalls, distances_from
 from pneunet.hifi.fem import surface
 
 PITCHES = 3
 DIVISIONS = 3
-KPA = 1e3
 
 
 def draw_cell(problem, state, path, pitches=PITCHES):
@@ -51,7 +51,7 @@ def draw_cell(problem, state, path, pitches=PITCHES):
         if state.walls_overlap
         else f"walls {state.wall_distance:.3f} mm apart"
     )
-    title = f"{state.pressure * KPA:.4g} kPa, {'' if contact else 'no '}contact: {told}"
+    title = f"{state.pressure * KPA_PER_MPA:.4g} kPa, {'' if contact else 'no '}contact: {told}"
     draw_walls(path, body, lines, walls, gap, title, TOUCHING * gap if contact else 0.0)
     return True
 

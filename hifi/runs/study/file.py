@@ -10,6 +10,7 @@ import itertools
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import as_table, file_key, number, read_toml, refuse_unknown
@@ -20,7 +21,7 @@ from pneunet.geometry.parameters import Segment
 from pneunet.hifi.cell.file import cell_from_tables, cell_tables
 from pneunet.hifi.runs.cases import Case
 
-KINDS = ("cell", "segment", "manipulator")
+BODIES = ("cell", "segment", "manipulator")
 SEGMENT_KEYS = [file_key(f) for f in fields(Segment) if "unit" in f.metadata]
 MATERIAL_KEYS = ["silicone", "law"] + sorted(
     {file_key(f) for law in LAWS.values() for f in fields(law)} - {"name", "source"}
@@ -40,12 +41,12 @@ class StudyCase:
     """One row of the list or grid: {variable as the user wrote it: value}, its case, or why there can be
     none."""
 
-    values: dict
+    values: dict[str, Any]
     case: Case | None
     refusal: str = ""
 
     @property
-    def label(self):
+    def label(self) -> str:
         return ", ".join(f"{name} = {value}" for name, value in self.values.items()) or "the body as it is"
 
 
@@ -54,12 +55,12 @@ class Study:
     """cases: StudyCase in order; variables: names of what is varied; limits: of one case."""
 
     kind: str
-    variables: tuple
-    cases: tuple
+    variables: tuple[str, ...]
+    cases: tuple[StudyCase, ...]
     limits: Limits
 
 
-def read_study(path):
+def read_study(path: str | Path) -> Study:
     """The Study in a TOML file; InputError that names key and fix otherwise.
 
     A combination of the grid that is no valid body is kept with its refusal, a listed case or a whole grid of
@@ -74,7 +75,7 @@ def read_study(path):
             raise InputError(f"{where}: key '{key}' is missing: {fix}")
     refuse_unknown(data, ["kind", "base", "levels", "limits", "grid", "case"], where)
     kind = data["kind"]
-    if kind not in KINDS:
+    if kind not in BODIES:
         raise InputError(f"{where}: kind = {kind!r} is not known: write 'cell', 'segment' or 'manipulator'")
     base = _base(data["base"], kind, Path(path))
     levels = number(data.get("levels", base.get("levels", DEFAULT_LEVELS)), "levels", where, integer=True)
@@ -214,7 +215,7 @@ def _limits(table, where):
     return Limits(table.get("time_s", DEFAULT_TIME), table.get("memory_MB"))
 
 
-def value_of(name, study_case, default=""):
+def value_of(name: str, study_case: StudyCase, default: object = "") -> Any:
     """What the column of variable `name` shows: the case's value, or the body's where other cases vary it."""
     if name in study_case.values or study_case.case is None:
         return study_case.values.get(name, default)
