@@ -20,8 +20,8 @@ from pneunet.design.target.segmentation import NOTE, split
 from pneunet.design.target.target import HELICAL, TWISTING
 from pneunet.geometry.designfile import Design, write_design
 from pneunet.geometry.parameters import TWISTING as TWISTING_KIND
+from pneunet.reduced import predict
 from pneunet.reduced.choice import choose_law
-from pneunet.reduced.model import predict
 
 GIVEN_NOTE = "split given by the user"
 

@@ -12,8 +12,8 @@ from pneunet.base.files.schemas import SHAPES
 from pneunet.design.report.labels import plain
 from pneunet.design.search.doubts import WARN, told_doubts
 from pneunet.geometry.designfile import read_design
+from pneunet.reduced import predict
 from pneunet.reduced.choice import choose_law
-from pneunet.reduced.model import predict
 
 FRAMES = 24
 FRAME_PIXELS = (540, 432)

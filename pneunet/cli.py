@@ -373,9 +373,8 @@ def run_train(a):
 
     with rank_map() as mapping:
         if mapping:  # other ranks have worked for this one
-            run_training(
-                a.data, a.output or a.data.with_name("law.npz"), say, not a.no_comparison, mapping, a.like
-            )
+            out = a.output or a.data.with_name("law.npz")
+            run_training(a.data, out, not a.no_comparison, mapping, a.like)
 
 
 def run_report(a):

@@ -10,7 +10,7 @@ from pneunet.base.errors import ConvergenceError
 from pneunet.base.strains import RodStrains
 from pneunet.design.report.labels import plain
 from pneunet.design.target.metrics import Errors, compare
-from pneunet.reduced.model import doubts, predict
+from pneunet.reduced import doubts, predict
 
 # what the words of the verdict mean, in % of length (RMS of points paired by arc length)
 CONFIRMS, ROUGHLY = 2.0, 5.0

@@ -10,7 +10,7 @@ from pneunet.design.report import bodies
 from pneunet.design.report.drawing import chamber_plan
 from pneunet.design.report.labels import FINITE_ELEMENTS, plain, segment_colour
 from pneunet.design.report.pictures import curve_panels, legend, segment_bands
-from pneunet.reduced.model import predict
+from pneunet.reduced import predict
 
 
 def _mark(run):

@@ -1,7 +1,7 @@
 """What to do about a design that the law doubts: warn of it, or refuse it."""
 
 from pneunet.base.errors import InputError
-from pneunet.reduced.model import doubts
+from pneunet.reduced import doubts
 
 WARN, REFUSE = "warn", "refuse"
 OUTSIDE = (WARN, REFUSE)

@@ -14,7 +14,7 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.design.target.curves import arc_lengths, evenly, nearest_points
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.centreline import centreline
-from pneunet.reduced.rod.ends import free_manipulator
+from pneunet.reduced.rod.ends import free_pieces
 
 PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)
@@ -48,7 +48,7 @@ class Trial:
 
     def centreline(self, law, base_point):
         """The Centreline from base_point (3,), mm."""
-        pieces = free_manipulator(self.segments, law.each(self.segments, self.pressure), self.counts)
+        pieces = free_pieces(self.segments, law.each(self.segments, self.pressure), self.counts)
         return centreline(*pieces, SPACING, se3.make_pose(self.rotation, base_point))
 
 

@@ -10,7 +10,7 @@ from pneunet.base.files.schemas import CENTRELINE, CENTRELINES, SEGMENTS, STEPS,
 from pneunet.base.strains import RodStrains
 from pneunet.geometry.designfile import Design, body_tables, write_design
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.model import AnalyticModel, predict
+from pneunet.reduced import AnalyticLaw, predict
 
 FACTOR = 0.8
 POSE = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, -3.0], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
@@ -19,12 +19,12 @@ HELIX = Segment("one-sided", 60.0, 9, gap=1.5)
 PLANE = Segment("one-sided", 90.0, 4, gap=1.5)
 
 
-class Scaled(AnalyticModel):
+class Scaled(AnalyticLaw):
     """FACTOR times the analytic model's strains."""
 
     def strains(self, segment, pressure):
-        rest, s = RodStrains.unstrained(), super().strains(segment, pressure)
-        return RodStrains(rest.e + FACTOR * (s.e - rest.e), FACTOR * s.k)
+        rest = RodStrains.unstrained().vector
+        return RodStrains.of_vector(rest + FACTOR * (super().strains(segment, pressure).vector - rest))
 
 
 def make_run(
@@ -39,7 +39,7 @@ def make_run(
 ):
     """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap`
     mm there, with `contact` as a contact model's penetration."""
-    manipulator, model = Manipulator(segments), AnalyticModel()
+    manipulator, model = Manipulator(segments), AnalyticLaw()
     design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
     directory.mkdir(parents=True, exist_ok=True)
     write_design(directory / "design.toml", design)
@@ -74,7 +74,7 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
             + [0, 0, 0, 1.5 * n]
         )
         centrelines += [[n, p * 1e3, s, *point, 0, 0] for s, point in zip(line.s, line.points)]
-        segments += [[n, p * 1e3, i + 1, *one.e, *one.k, 0, 0] for i, one in enumerate(each)]
+        segments += [[n, p * 1e3, i + 1, *one.vector, 0, 0] for i, one in enumerate(each)]
     walls = [
         [i + 1, "top" if side > 0 else "bottom", gap, s.gap, s.gap * (0.4 + 0.5 * gap / s.chambers)]
         for i, s in enumerate(manipulator.segments)

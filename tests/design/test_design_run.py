@@ -11,7 +11,7 @@ from pneunet.design.run import run_design
 from pneunet.design.target.metrics import compare
 from pneunet.geometry.designfile import read_design
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.model import predict
+from pneunet.reduced import predict
 from tests.design.toy_law import ToyLaw
 
 POINTS = ("x_mm", "y_mm", "z_mm")

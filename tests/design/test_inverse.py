@@ -13,7 +13,7 @@ from pneunet.design.target.extraction import extract
 from pneunet.design.target.metrics import compare
 from pneunet.design.target.target import Piece, Target
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.model import predict
+from pneunet.reduced import predict
 from tests.design.toy_law import ToyLaw
 
 TWISTING = Segment("twisting", 65.0, 7, gap=2.2, cavity_floor=0.5, chamber_height=5.5)

@@ -10,7 +10,7 @@ from pneunet.design.report.drawing import chamber_plan, section_groups, segment_
 from pneunet.design.report.labels import plain, segment_name, significant
 from pneunet.geometry.designfile import Design
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.model import AnalyticModel
+from pneunet.reduced import AnalyticLaw
 from tests.design.fake_run import HELIX, PLANE, POSE, TWIST, make_run
 
 
@@ -132,7 +132,7 @@ def test_shape_files(tmp_path):
     from pneunet.design.shape import run_shape
 
     make_run(tmp_path, solve=False)
-    folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, lambda text: None, AnalyticModel())
+    folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, lambda text: None, AnalyticLaw())
     rows = read_columns(folder / "centrelines.csv", ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"])
     at_design = rows[rows[:, 0] == 20.0][:, 1:]
     assert at_design == pytest.approx(
@@ -145,7 +145,7 @@ def test_shape_files(tmp_path):
     assert (folder / "inflation.gif").stat().st_size < 3e6
 
 
-class Limited(AnalyticModel):
+class Limited(AnalyticLaw):
     """A law that has no solution above 15 kPa."""
 
     name = "limited"

@@ -11,13 +11,13 @@ from pneunet.base.se3 import transform
 from pneunet.design.report.comparison import Comparison, overlaps, smooth, stopped_short, verdict
 from pneunet.design.report.rundata import read_run
 from pneunet.design.target.metrics import compare
-from pneunet.reduced.model import AnalyticModel
+from pneunet.reduced import AnalyticLaw
 from tests.design.fake_run import FACTOR, HELIX, PLANE, POSE, make_run
 
 
 def judged(directory):
     run = read_run(directory)
-    return run, Comparison.of(run, AnalyticModel())
+    return run, Comparison.of(run, AnalyticLaw())
 
 
 def test_comparison_is_made_in_target_coordinates(tmp_path):

@@ -168,7 +168,7 @@ class Sampler:
         row = {
             "kind": kind,
             "pressure": state.pressure,
-            "strains": [*state.strains.e, *state.strains.k],
+            "strains": [*state.strains.vector],
             "forces": [*state.force, *state.moment],
             "stiffness": state.stiffness.tolist(),
             "volume": state.volume,
