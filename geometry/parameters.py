@@ -8,40 +8,43 @@ bending cancels.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import quantity
 from pneunet.base.materials.laws import Hyperelastic, NeoHookean
+from pneunet.base.quantities import check_quantities, quantity
 
 ONE_SIDED, TWISTING = "one-sided", "twisting"
 KINDS = (ONE_SIDED, TWISTING)
+_size = partial(quantity, "mm", above=0, low=0.05, high=500, hint="not a castable size; is it in metres?")
 
 
 @dataclass(frozen=True)
 class Segment:
     """One run of equal chambers. "normal" = across the chamber."""
 
-    kind: str = quantity(None, note="'one-sided' (bends, helical away from 90 deg) or 'twisting'")
-    angle: float = quantity(
-        "deg", note="between the chambers' long side and the x axis; 90 = across the beam"
+    kind: str = quantity(
+        None, note="'one-sided' (bends, helical away from 90 deg) or 'twisting'", choices=KINDS
     )
-    chambers: int = quantity(None, note="whole chambers (pairs, for a twisting segment)")
-    width: float = quantity("mm", 12.0, "body width")
-    chamber_height: float = quantity("mm", 4.0, "cavity, floor to ceiling")
-    cavity_thickness: float = quantity("mm", 2.0, "cavity, normal")
-    wall: float = quantity("mm", 1.0, "between cavity and gap, normal")
-    gap: float = quantity("mm", 1.0, "between neighbouring chambers, normal")
-    top_wall: float = quantity("mm", 1.0, "above the cavity")
-    side_wall: float = quantity("mm", 1.0, "at both ends of the cavity's long side, along y")
-    base_thickness: float = quantity("mm", 2.0, "below the channel (one-sided)")
-    roof: float = quantity("mm", 1.0, "core above the channel, under the gaps")
-    channel_width: float = quantity("mm", 4.0, "air channel, y")
-    channel_height: float = quantity("mm", 2.0, "air channel, z")
+    angle: float = quantity(
+        "deg", note="between the chambers' long side and the x axis; 90 = across the beam", low=30, high=150
+    )
+    chambers: int = quantity(None, note="whole chambers (pairs, for a twisting segment)", low=1)
+    width: float = _size(12.0, "body width")
+    chamber_height: float = _size(4.0, "cavity, floor to ceiling")
+    cavity_thickness: float = _size(2.0, "cavity, normal")
+    wall: float = _size(1.0, "between cavity and gap, normal")
+    gap: float = _size(1.0, "between neighbouring chambers, normal")
+    top_wall: float = _size(1.0, "above the cavity")
+    side_wall: float = _size(1.0, "at both ends of the cavity's long side, along y")
+    base_thickness: float = _size(2.0, "below the channel (one-sided)")
+    roof: float = _size(1.0, "core above the channel, under the gaps")
+    channel_width: float = _size(4.0, "air channel, y")
+    channel_height: float = _size(2.0, "air channel, z")
     cavity_floor: float = quantity("mm", 1.0, "z of the cavity's floor; at most half the channel height")
-    end_margin: float = quantity("mm", 2.0, "bare core beyond the outermost corner of a chamber, each end")
+    end_margin: float = _size(2.0, "bare core beyond the outermost corner of a chamber, each end")
     layer_thickness: float = quantity(
         "mm", 0.0, "stiff layer at the bottom of the base (one-sided); 0 = none"
     )
@@ -49,33 +52,7 @@ class Segment:
     layer_material: Hyperelastic | None = None
 
     def __post_init__(self):
-        if self.kind not in KINDS:
-            raise InputError(f"kind = '{self.kind}' is not known: write 'one-sided' or 'twisting'")
-        if not 30 <= self.angle <= 150:
-            raise InputError(f"angle_deg = {self.angle:g} is outside 30..150")
-        if self.chambers < 1:
-            raise InputError(f"chambers = {self.chambers}: a segment needs at least 1")
-        for name in (
-            "width",
-            "chamber_height",
-            "cavity_thickness",
-            "wall",
-            "gap",
-            "top_wall",
-            "side_wall",
-            "base_thickness",
-            "roof",
-            "channel_width",
-            "channel_height",
-            "end_margin",
-        ):
-            value = getattr(self, name)
-            if not value > 0:
-                raise InputError(f"{name}_mm = {value:g} must be larger than 0")
-            if not 0.05 <= value <= 500:
-                raise InputError(
-                    f"{name}_mm = {value:g} is not a castable size (0.05..500 mm): is it in metres?"
-                )
+        check_quantities(self)
         self._check_layer()
         if 2 * self.side_wall >= self.width:
             raise InputError(

@@ -5,13 +5,14 @@ det(C)^(1/3) and l1, l2, l3 its principal stretches. Incompressible unless a bul
 """
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
 
-from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, file_key, from_table, quantity, to_table
+from pneunet.base.errors import InputError, located
+from pneunet.base.files.toml import as_table, from_table, to_table
 from pneunet.base.materials.hyperelastic import MODES, stable_stretch
 from pneunet.base.materials.silicones import bulletin
+from pneunet.base.quantities import check_quantities, quantities, quantity
 
 #: a law that is not stable up to this stretch has a slip in its numbers
 STABLE_AT_LEAST = 1.2
@@ -25,19 +26,14 @@ class Hyperelastic:
     engineering strain, inf = not known. Infinite values are not written to files.
     """
 
-    density: float = quantity("kg_per_m3", 1.07e-9, note="mass density")
+    density: float = quantity("kg_per_m3", 1.07e-9, "mass density", low=0, high=1e5)
     bulk_modulus: float = quantity("MPa", math.inf, note="incompressible unless given")
-    elongation_at_break: float = quantity("percent", math.inf, note="engineering strain at break")
-    name: str = field(default="silicone", metadata={"unit": None, "note": "free text"})
-    source: str = field(default="", metadata={"unit": None, "note": "where the numbers come from"})
+    elongation_at_break: float = quantity("percent", math.inf, "engineering strain at break", above=0)
+    name: str = quantity(None, "silicone", "free text")
+    source: str = quantity(None, "", "where the numbers come from")
 
     def __post_init__(self):
-        if not 0 <= self.density < 1e-7:
-            raise InputError(f"density_kg_per_m3 = {self.density * 1e12:g} is outside 0..1e5")
-        if not self.elongation_at_break > 0:
-            raise InputError(
-                f"elongation_at_break_percent = {self.elongation_at_break * 100:g} must be larger than 0"
-            )
+        check_quantities(self)
         self._check_law()
         if not 1e-4 <= self.mu <= 1e3:
             raise InputError(
@@ -123,16 +119,15 @@ class Gent(Hyperelastic):
     """W = -mu jm/2 ln(1 - (I1 - 3)/jm): no state with I1 >= 3 + jm exists."""
 
     mu: float = quantity("MPa", note="shear modulus")
-    jm: float = quantity(None, note="largest I1 - 3")
+    jm: float = quantity(
+        None,
+        note="largest I1 - 3",
+        low=0.1,
+        high=1e6,
+        hint="it is the largest I1 - 3 (some 10 to 100 for silicones)",
+    )
     law = "Gent"
     stiffness = "mu_MPa"
-
-    def _check_law(self):
-        if not 0.1 <= self.jm <= 1e6:
-            raise InputError(
-                f"jm = {self.jm:g} must lie in 0.1..1e6: it is the largest I1 - 3 (some 10 to 100 for"
-                " silicones)"
-            )
 
 
 @dataclass(frozen=True)
@@ -208,10 +203,8 @@ def material_from_table(table, where):
             raise InputError(
                 f"{where}: 'silicone' and 'law' exclude each other: the table of silicones is neo-Hookean"
             )
-        try:
+        with located(where):
             table = {**bulletin(table.pop("silicone")), **table}
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
     law = table.pop("law", NeoHookean.law)
     if law not in tuple(LAWS):
         raise InputError(f"{where}: unknown law '{law}': known laws are {', '.join(LAWS)}")
@@ -221,5 +214,5 @@ def material_from_table(table, where):
 def material_to_table(material):
     """The TOML table that material_from_table reads, the law's own parameters first."""
     table = to_table(material)
-    own = {file_key(f): table.pop(file_key(f)) for f in fields(material) if f.name in material.parameters}
+    own = {k: table.pop(k) for k, f in quantities(type(material)).items() if f.name in material.parameters}
     return {"law": material.law, **own, **table}
