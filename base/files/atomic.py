@@ -30,7 +30,7 @@ def atomic_path(path):
 
 def write_text(path, text):
     with atomic_path(path) as temporary:
-        temporary.write_text(text)
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def write_csv(path, header, rows):
@@ -46,7 +46,7 @@ def write_csv(path, header, rows):
 def read_csv(path):
     """(header, rows of text) of a CSV file; a missing file is an InputError."""
     try:
-        with open(path, newline="") as stream:
+        with open(path, newline="", encoding="utf-8") as stream:
             rows = [row for row in csv.reader(stream) if row and any(cell.strip() for cell in row)]
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None

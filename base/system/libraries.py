@@ -6,19 +6,17 @@ from contextlib import contextmanager
 from pneunet.base.errors import InputError
 
 _SOLVERS = (
-    "finite elements are not installed with pip: on Debian 12 or 13 run 'make setup' in a checkout of pneunet,"
+    "pip does not bring finite elements; on Debian 12 or 13 run 'make setup' in a checkout of pneunet,"
     " elsewhere use its container image ('make image')"
 )
 _PICTURES = "install it with: pip install 'pneunet[pictures]'"
 #: module -> what to do where it is missing
-MISSING = (
-    dict.fromkeys(("dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"), _SOLVERS)
-    | dict.fromkeys(("pyvista", "vtk", "vtkmodules", "matplotlib", "PIL"), _PICTURES)
-    | {"gmsh": "install it with: pip install gmsh (in a checkout on Debian: make setup)"}
-    | dict.fromkeys(
-        ("fcntl", "resource"), "this command runs on Linux alone; elsewhere use the container image"
-    )
-)
+MISSING = {
+    **dict.fromkeys(("dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"), _SOLVERS),
+    **dict.fromkeys(("pyvista", "vtk", "vtkmodules", "matplotlib", "PIL"), _PICTURES),
+    **dict.fromkeys(("fcntl", "resource"), "this runs on Linux alone; elsewhere use the container image"),
+    "gmsh": "install it with: pip install gmsh (in a checkout on Debian: make setup)",
+}
 
 
 @contextmanager
