@@ -1,7 +1,7 @@
 """Quantities of frozen dataclasses: declared once with their unit, file key and allowed values.
 
 A field declared with `quantity("mm", 10.0)` is called `width` in Python (mm, MPa, degrees) and `width_mm` in
-files (`base.files.toml`). `check_quantities` refuses what is not allowed, whoever makes the instance.
+files (`base.files.toml`); a `Checked` dataclass refuses what is not allowed.
 """
 
 import dataclasses
@@ -33,11 +33,12 @@ class Allowed:
         except TypeError:
             return False
 
-    def refusal(self, value: object, unit: str | None = None) -> str:
+    def refusal(self, value: Any, unit: str | None = None) -> str:
         """What a value that is not allowed must be, to be read after "KEY = VALUE "."""
         if self.choices:
             return f"is not known: write {listed(self.choices)}"
-        if not isinstance(value, Real):
+        numeric = isinstance(value, Real)
+        if not numeric:
             return "must be a number"
         if self.above > -math.inf and not value > self.above:
             return f"must be larger than {self.above:g}"
@@ -62,7 +63,6 @@ def quantity(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-@functools.cache
 def quantities(cls: type) -> dict[str, dataclasses.Field]:
     """{file key: field} of the fields that a dataclass declares with `quantity`, in order."""
     found = {}
@@ -74,7 +74,7 @@ def quantities(cls: type) -> dict[str, dataclasses.Field]:
 
 
 @functools.cache
-def _limited(cls: type) -> list[tuple]:
+def _limited(cls: Any) -> list[tuple]:
     """[(key, field, factor to the inner unit, Allowed)] of the quantities that do not take any value."""
     return [
         (key, f, TO_INTERNAL.get(f.metadata["unit"], 1.0), f.metadata["allowed"])
@@ -83,23 +83,27 @@ def _limited(cls: type) -> list[tuple]:
     ]
 
 
-def check_quantities(instance: object) -> None:
-    """InputError with key, value and fix of the first quantity with a value that is not allowed; what is None
-    by default need not be given.
+class Checked:
+    """A dataclass that refuses quantities with values that are not allowed, whoever makes the instance:
+    Python's callers and files are told the same."""
 
-    For the `__post_init__` of a dataclass: so Python's callers and files are told the same.
-    """
-    for key, field, factor, allowed in _limited(type(instance)):
-        value = getattr(instance, field.name)
-        if value is None and field.default is None:
-            continue
-        if factor != 1.0 and isinstance(value, Real):
-            value = rounded(value / factor)
-        if value not in allowed:
-            shown = f"{value:g}" if isinstance(value, float) else repr(value)
-            raise InputError(f"{key} = {shown} {allowed.refusal(value, field.metadata['unit'])}")
+    def __post_init__(self) -> None:
+        """InputError with key, value and fix of the first quantity whose value is not allowed.
+
+        What is None by default need not be given.
+        """
+        cls: Any = type(self)
+        for key, field, factor, allowed in _limited(cls):
+            value = getattr(self, field.name)
+            if value is None and field.default is None:
+                continue
+            if factor != 1.0 and isinstance(value, Real):
+                value = rounded(value / factor)
+            if value not in allowed:
+                shown = f"{value:g}" if isinstance(value, float) else repr(value)
+                raise InputError(f"{key} = {shown} {allowed.refusal(value, field.metadata['unit'])}")
 
 
-def rounded(value: float) -> float:
+def rounded(value: Any) -> float:
     """To 12 digits: what a change of units adds behind them is taken off."""
     return float(f"{value:.12g}")

@@ -9,7 +9,7 @@ from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown, to_table, toml_text
 from pneunet.base.materials.laws import Hyperelastic, material_from_table, material_to_table
-from pneunet.base.quantities import check_quantities, quantities, quantity
+from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_control
 from pneunet.geometry.parameters import Manipulator, Segment
 
@@ -17,7 +17,7 @@ SCHEMA = "pneunet-design-1"
 
 
 @dataclass(frozen=True)
-class Design:
+class Design(Checked):
     """What the commands mesh, shape and solve read.
 
     pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm;
@@ -40,7 +40,7 @@ class Design:
     contact: str = quantity(None, CONTACTS[0], choices=CONTACTS)
 
     def __post_init__(self) -> None:
-        check_quantities(self)
+        super().__post_init__()
         if self.pressure == 0 and not self.loads:
             raise InputError("pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads]")
 

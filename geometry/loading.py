@@ -7,7 +7,7 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import from_table, to_table
-from pneunet.base.quantities import check_quantities, quantities, quantity
+from pneunet.base.quantities import Checked, quantities, quantity
 
 CONTROLS = ("pressure", "volume", "arc length")
 #: of the walls of neighbouring chambers: held apart where they touch, or not
@@ -49,7 +49,7 @@ class DeadLoads:
 
 
 @dataclass(frozen=True)
-class Control:
+class Control(Checked):
     """What is prescribed along the path: 'pressure' up to the design's; 'volume' of the cavity up to
     `volume_factor` times the one at rest, which walks through limit points of the pressure; or 'arc length',
     root mean square displacement of the nodes summed along the path, up to `arc_length` mm, which walks
@@ -58,8 +58,6 @@ class Control:
     name: str = quantity(None, "pressure", key="control", choices=CONTROLS)
     volume_factor: float = quantity(None, 2.0, low=1.001, high=100)
     arc_length: float = quantity("mm", 10.0, low=1e-3, high=1e4)
-
-    __post_init__ = check_quantities
 
     def table(self) -> dict:
         """The keys that say so in a file; empty for pressure control."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import Hyperelastic, NeoHookean
-from pneunet.base.quantities import check_quantities, quantity
+from pneunet.base.quantities import Checked, quantity
 
 ONE_SIDED, TWISTING = "one-sided", "twisting"
 KINDS = (ONE_SIDED, TWISTING)
@@ -22,7 +22,7 @@ _size = partial(quantity, "mm", above=0, low=0.05, high=500, hint="not a castabl
 
 
 @dataclass(frozen=True)
-class Segment:
+class Segment(Checked):
     """One run of equal chambers. "normal" = across the chamber."""
 
     kind: str = quantity(
@@ -51,8 +51,8 @@ class Segment:
     material: Hyperelastic = NeoHookean(mu=0.317)
     layer_material: Hyperelastic | None = None
 
-    def __post_init__(self):
-        check_quantities(self)
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._check_layer()
         if 2 * self.side_wall >= self.width:
             raise InputError(
@@ -110,92 +110,92 @@ class Segment:
             )
 
     @property
-    def key(self):
+    def key(self) -> "Segment":
         """Hashable identity of the cell: everything that the strains of the middle of a long segment depend
         on."""
         return replace(self, chambers=1, end_margin=1.0 + self.gap / self.sin / 2)
 
     @property
-    def mirrored(self):
+    def mirrored(self) -> "Segment":
         """The mirror image: 180 - angle, opposite handedness."""
         return replace(self, angle=180.0 - self.angle)
 
     @cached_property
-    def sin(self):
+    def sin(self) -> float:
         return float(np.sin(np.radians(self.angle)))
 
     @cached_property
-    def cot(self):
+    def cot(self) -> float:
         """cot(angle); 0 exactly at 90 degrees, odd about it."""
         return float(np.tan(np.radians(90.0 - self.angle)))
 
     @property
-    def chamber_thickness(self):
+    def chamber_thickness(self) -> float:
         """Outer thickness of a chamber, normal, mm."""
         return self.cavity_thickness + 2 * self.wall
 
     @property
-    def pitch(self):
+    def pitch(self) -> float:
         """Axial distance of neighbouring chambers, mm."""
         return (self.chamber_thickness + self.gap) / self.sin
 
     @property
-    def cavity_width(self):
+    def cavity_width(self) -> float:
         return self.width - 2 * self.side_wall
 
     @property
-    def core_top(self):
+    def core_top(self) -> float:
         return self.channel_height / 2 + self.roof
 
     @property
-    def core_bottom(self):
+    def core_bottom(self) -> float:
         return -self.core_top if self.kind == TWISTING else -self.channel_height / 2 - self.base_thickness
 
     @property
-    def layer_top(self):
+    def layer_top(self) -> float:
         """z (mm) up to which the bottom layer's material reaches; core_bottom when there is none."""
         return self.core_bottom + self.layer_thickness
 
     @property
-    def cavity_top(self):
+    def cavity_top(self) -> float:
         return self.cavity_floor + self.chamber_height
 
     @property
-    def chamber_top(self):
+    def chamber_top(self) -> float:
         return self.cavity_top + self.top_wall
 
     @property
-    def chamber_bottom(self):
+    def chamber_bottom(self) -> float:
         """Lowest point of the body, z in mm."""
         return -self.chamber_top if self.kind == TWISTING else self.core_bottom
 
     @property
-    def sides(self):
+    def sides(self) -> tuple[int, ...]:
         """+1 for the chambers above the core, -1 for the set turned by half a turn about x."""
         return (1, -1) if self.kind == TWISTING else (1,)
 
     @property
-    def end_length(self):
+    def end_length(self) -> float:
         """Passive length at each end, mm: wedge of the slanted chamber and the bare core beyond it."""
         return self.width / 2 * abs(self.cot) + self.end_margin
 
     @property
-    def end_wall(self):
+    def end_wall(self) -> float:
         """What closes the channel at a free end, mm: the channel runs half a gap beyond the outermost
         chamber."""
         return self.end_length - self.gap / self.sin / 2
 
     @property
-    def active_length(self):
+    def active_length(self) -> float:
         """(N-1) pitches and one chamber, mm."""
         return (self.chambers - 1) * self.pitch + self.chamber_thickness / self.sin
 
     @property
-    def length(self):
+    def length(self) -> float:
         return self.active_length + 2 * self.end_length
 
     @property
-    def chamber_positions(self):
+    def chamber_positions(self) -> np.ndarray:
         """Centres of the chambers on the axis, x in mm from the segment's start, shape (chambers,)."""
         first = self.end_length + self.chamber_thickness / self.sin / 2
         return first + self.pitch * np.arange(self.chambers)
@@ -205,9 +205,9 @@ class Segment:
 class Manipulator:
     """Segments in a row, joined on the channel axis, sharing one cavity."""
 
-    segments: tuple
+    segments: tuple[Segment, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "segments", tuple(self.segments))
         if not self.segments:
             raise InputError("segment: at least one [[segment]] is needed")
@@ -225,25 +225,25 @@ class Manipulator:
                 )
 
     @property
-    def length(self):
+    def length(self) -> float:
         return sum(s.length for s in self.segments)
 
     @property
-    def starts(self):
+    def starts(self) -> np.ndarray:
         """Undeformed arc length at which each segment begins, mm, shape (segments,)."""
         return np.concatenate([[0.0], np.cumsum([s.length for s in self.segments])[:-1]])
 
     @property
-    def materials(self):
+    def materials(self) -> tuple[Hyperelastic, ...]:
         """Every material of the body once, layers included."""
         return tuple(
             dict.fromkeys(m for s in self.segments for m in (s.material, s.layer_material) if m is not None)
         )
 
     @property
-    def chambers(self):
+    def chambers(self) -> int:
         return sum(s.chambers for s in self.segments)
 
     @property
-    def mirrored(self):
+    def mirrored(self) -> "Manipulator":
         return Manipulator(tuple(s.mirrored for s in self.segments))

@@ -405,7 +405,7 @@ def run_report(a):
 def run_fit_material(a):
     from pneunet.base.materials.fit_run import run_fit
 
-    run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100, say=say)
+    run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100)
 
 
 def run_ranks(a):

@@ -145,7 +145,7 @@ def toml_text(tables: dict) -> str:
     back."""
     lines = []
 
-    def write(table, path):
+    def write(table: dict, path: str) -> None:
         for key, value in table.items():
             if not isinstance(value, dict) and not _is_table_array(value):
                 lines.append(f"{key} = {_value(value)}")

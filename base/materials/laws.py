@@ -12,14 +12,14 @@ from pneunet.base.errors import InputError, located
 from pneunet.base.files.toml import as_table, from_table, to_table
 from pneunet.base.materials.hyperelastic import MODES, stable_stretch
 from pneunet.base.materials.silicones import bulletin
-from pneunet.base.quantities import check_quantities, quantities, quantity
+from pneunet.base.quantities import Checked, quantities, quantity
 
 #: a law that is not stable up to this stretch has a slip in its numbers
 STABLE_AT_LEAST = 1.2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperelastic:
+class Hyperelastic(Checked):
     """What every law has beside its own parameters; those come first, in order of the law's formula.
 
     density in tonne/mm^3 (file key: kg/m^3); bulk_modulus in MPa, inf = incompressible; elongation_at_break:
@@ -33,7 +33,7 @@ class Hyperelastic:
     source: str = quantity(None, "", "where the numbers come from")
 
     def __post_init__(self):
-        check_quantities(self)
+        super().__post_init__()
         self._check_law()
         if not 1e-4 <= self.mu <= 1e3:
             raise InputError(

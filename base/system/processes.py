@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from pneunet.base.quantities import check_quantities, quantity
+from pneunet.base.quantities import Checked, quantity
 
 #: variables by which MPI launchers (Open MPI 4 and 5, MPICH, SLURM's PMI) tell a process that it is one of
 #: their ranks
@@ -24,14 +24,12 @@ DOORMAN = Path(__file__).with_name("doorman.py")
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(Checked):
     """What one child may take: wall time in s, memory (RLIMIT_DATA: heap and private maps of each process) in
     MB; None: all."""
 
     seconds: float | None = quantity("s", None, key="time_s", above=0)
     memory_MB: float | None = quantity("MB", None, key="memory_MB", above=0)
-
-    __post_init__ = check_quantities
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import from_table, to_table
-from pneunet.base.quantities import check_quantities, quantities, quantity
+from pneunet.base.quantities import Checked, quantities, quantity
 
 
 @dataclass(frozen=True)
-class Valve:
+class Valve(Checked):
     pressure: float = quantity("kPa", 0.02, low=0, high=2000, hint="is it in Pa?")
     bore: float = quantity("mm", 1.0, above=0, low=0.05, high=50)
     turns: int = quantity(None, 2, low=1)
@@ -21,8 +21,6 @@ class Valve:
     tight: bool = quantity(None, True)
     source: str = quantity(None, "")
     maker: object = None
-
-    __post_init__ = check_quantities
 
 
 REFUSED = {

@@ -9,19 +9,17 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import from_table, read_toml, refuse_unknown, to_table, toml_text
 from pneunet.base.materials.laws import PAPER_HELICAL, NeoHookean, material_from_table, material_to_table
-from pneunet.base.quantities import check_quantities, quantity
+from pneunet.base.quantities import Checked, quantity
 
 
 @dataclass(frozen=True)
-class Tube:
+class Tube(Checked):
     angle: float = quantity("deg", note="of the fibres")
     radius: float = quantity("mm", 3.0, "inner", above=0)
     pressure: float = quantity("kPa", 0.02)
     fibres: int = quantity(None, 4)
     label: str = quantity(None, "a tube")
     law: object = None
-
-    __post_init__ = check_quantities
 
 
 def test_nested_tables_read_back():
