@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.system.libraries import told_what_to_install
 from pneunet.base.system.log import is_rank_0, show_on_screen
 from pneunet.launch import rank_map
 
@@ -76,11 +77,25 @@ def strain_percent(text):
     return value
 
 
+class Version(argparse.Action):
+    """`--version`: name, version and revision, asked for when they are wanted."""
+
+    def __call__(self, parser, *_):
+        from importlib.metadata import version
+
+        from pneunet.base.files.record import revision
+
+        number, built = version("pneunet"), revision()
+        print(f"pneunet {number}" + (f" ({built})" if built != number else ""))
+        parser.exit()
+
+
 def parser():
     top = Parser(
         prog="pneunet",
         description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.",
     )
+    top.add_argument("--version", action=Version, nargs=0, help="name, version and revision")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
 
     def add(name, function, text):
@@ -387,7 +402,7 @@ def run_report(a):
 def run_fit_material(a):
     from pneunet.base.materials.fit_run import run_fit
 
-    run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100, say=say)
+    run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100)
 
 
 def run_ranks(a):
@@ -411,7 +426,8 @@ def main(arguments=None):
     show_on_screen()
     try:
         a = parser().parse_args(arguments)
-        return a.function(a) or 0
+        with told_what_to_install():
+            return a.function(a) or 0
     except (InputError, ConvergenceError, MemoryError) as error:
         # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with
         # it what rank 0 still has to say, at the first failure

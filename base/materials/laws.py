@@ -7,17 +7,18 @@ here and a name in LAWS.
 """
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, file_key, from_table, quantity, to_table
+from pneunet.base.errors import InputError, located
+from pneunet.base.files.toml import as_table, from_table, to_table
 from pneunet.base.materials import halfpowers
 from pneunet.base.materials.hyperelastic import MODES, stable_stretch
 from pneunet.base.materials.silicones import bulletin
+from pneunet.base.quantities import Checked, quantities, quantity
 
 #: a law that is not stable up to this stretch has a slip in its numbers
 STABLE_AT_LEAST = 1.2
@@ -47,7 +48,7 @@ class Arrays:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperelastic:
+class Hyperelastic(Checked):
     """What every law has beside its own parameters; those come first, in order of the law's formula.
 
     A law says its `energy`, `law`, its name in files, `stiffness`, its shear modulus in words, and `mu`, that
@@ -59,11 +60,12 @@ class Hyperelastic:
     engineering strain, inf = not known. Infinite values are not written to files.
     """
 
-    density: float = quantity("kg_per_m3", 1.07e-9, note="mass density")
+    density: float = quantity("kg_per_m3", 1.07e-9, "mass density", low=0, high=1e5)
     bulk_modulus: float = quantity("MPa", math.inf, note="incompressible unless given")
-    elongation_at_break: float = quantity("percent", math.inf, note="engineering strain at break")
-    name: str = field(default="silicone", metadata={"unit": None, "note": "free text"})
-    source: str = field(default="", metadata={"unit": None, "note": "where the numbers come from"})
+    elongation_at_break: float = quantity("percent", math.inf, "engineering strain at break", above=0)
+    name: str = quantity(None, "silicone", "free text")
+    source: str = quantity(None, "", "where the numbers come from")
+
     law: ClassVar[str]
     stiffness: ClassVar[str]
     parameters: ClassVar[tuple[str, ...]]
@@ -94,12 +96,7 @@ class Hyperelastic:
         raise NotImplementedError
 
     def __post_init__(self) -> None:
-        if not 0 <= self.density < 1e-7:
-            raise InputError(f"density_kg_per_m3 = {self.density * 1e12:g} is outside 0..1e5")
-        if not self.elongation_at_break > 0:
-            raise InputError(
-                f"elongation_at_break_percent = {self.elongation_at_break * 100:g} must be larger than 0"
-            )
+        super().__post_init__()
         self._check_law()
         if not 1e-4 <= self.mu <= 1e3:
             raise InputError(
@@ -197,7 +194,13 @@ class Gent(Hyperelastic):
     """W = -mu jm/2 ln(1 - (I1 - 3)/jm): no state with I1 >= 3 + jm exists."""
 
     mu: float = quantity("MPa", note="shear modulus")
-    jm: float = quantity(None, note="largest I1 - 3")
+    jm: float = quantity(
+        None,
+        note="largest I1 - 3",
+        low=0.1,
+        high=1e6,
+        hint="it is the largest I1 - 3 (some 10 to 100 for silicones)",
+    )
     law = "Gent"
     stiffness = "mu_MPa"
 
@@ -216,13 +219,6 @@ class Gent(Hyperelastic):
     def fit_range(cls, name: str, largest: float) -> tuple[float, float]:
         """Beyond the upper end it is the neo-Hookean law."""
         return 1.001 * (largest**2 + 2 / largest - 3), 1e5
-
-    def _check_law(self):
-        if not 0.1 <= self.jm <= 1e6:
-            raise InputError(
-                f"jm = {self.jm:g} must lie in 0.1..1e6: it is the largest I1 - 3 (some 10 to 100 for"
-                " silicones)"
-            )
 
 
 @dataclass(frozen=True)
@@ -306,10 +302,8 @@ def material_from_table(table: dict, where: str) -> Hyperelastic:
             raise InputError(
                 f"{where}: 'silicone' and 'law' exclude each other: the table of silicones is neo-Hookean"
             )
-        try:
+        with located(where):
             table = {**bulletin(table.pop("silicone")), **table}
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
     law = table.pop("law", NeoHookean.law)
     if law not in tuple(LAWS):
         raise InputError(f"{where}: unknown law '{law}': known laws are {', '.join(LAWS)}")
@@ -319,5 +313,5 @@ def material_from_table(table: dict, where: str) -> Hyperelastic:
 def material_to_table(material: Hyperelastic) -> dict:
     """The TOML table that material_from_table reads, the law's own parameters first."""
     table = to_table(material)
-    own = {file_key(f): table.pop(file_key(f)) for f in fields(material) if f.name in material.parameters}
+    own = {k: table.pop(k) for k, f in quantities(type(material)).items() if f.name in material.parameters}
     return {"law": material.law, **own, **table}

@@ -3,7 +3,6 @@
 Every bad input is one line that names the key and the fix.
 """
 
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,9 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_csv
 from pneunet.base.files.schemas import TARGET
-from pneunet.base.files.toml import file_key, number, read_toml, refuse_unknown
+from pneunet.base.files.toml import number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
+from pneunet.base.quantities import quantities
 from pneunet.base.strains import helix_frenet
 from pneunet.base.units import MPA_PER_KPA, PER_MM_PER_M
 from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, TWISTING, Piece, Target
@@ -25,9 +25,9 @@ FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
 #: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
 #: found, and a bottom layer is no variable of the inverse design
 START_KEYS = {
-    file_key(f): f.name
-    for f in fields(Segment)
-    if f.metadata.get("unit") == "mm" and f.name != "layer_thickness"
+    key: f.name
+    for key, f in quantities(Segment).items()
+    if f.metadata["unit"] == "mm" and f.name != "layer_thickness"
 }
 SHARED = ("width", "channel_width", "channel_height", "cavity_floor", "end_margin")
 VARY_KEYS = {"angle_deg": "angle"} | {key: name for key, name in START_KEYS.items() if name not in SHARED}

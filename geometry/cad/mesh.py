@@ -15,11 +15,12 @@ from pneunet.base.files.atomic import atomic_path, write_text
 from pneunet.base.files.toml import to_table
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
+from pneunet.geometry.parameters import Manipulator
 
 log = logging.getLogger(__name__)
 
 
-def mesh_manipulator(manipulator, mesh_size, directory):
+def mesh_manipulator(manipulator: Manipulator, mesh_size: float, directory: str | Path) -> dict:
     """Write manipulator.msh, manipulator.step and mesh.json to `directory`; return the content of mesh.json.
 
     mesh_size in mm (tetrahedron edge). Raises InputError when gmsh cannot mesh it or a check fails; nothing
@@ -71,7 +72,7 @@ def mesh_manipulator(manipulator, mesh_size, directory):
     return facts
 
 
-def segment_tables(manipulator):
+def segment_tables(manipulator: Manipulator) -> list[dict]:
     """What a mesh depends on, in file units: every dimension, no material."""
     return [to_table(s) for s in manipulator.segments]
 
@@ -104,7 +105,7 @@ def _facet_nodes(tag):
     return np.concatenate(nodes).astype(int) if nodes else np.zeros((0, 3), int)
 
 
-def tet_volumes_and_quality(corners):
+def tet_volumes_and_quality(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Signed volumes (n,) in mm3 and mean-ratio quality (n,), 1 for a regular tetrahedron, of corners (n, 4,
     3)."""
     edges = corners[:, [1, 2, 3, 2, 3, 3]] - corners[:, [0, 0, 0, 1, 1, 2]]
@@ -112,7 +113,7 @@ def tet_volumes_and_quality(corners):
     return volumes, 12 * np.cbrt(3 * volumes) ** 2 * np.sign(volumes) / np.einsum("nei,nei->n", edges, edges)
 
 
-def open_edges(nodes):
+def open_edges(nodes: np.ndarray) -> int:
     """Number of edges of a triangle soup (n, 3) that are not shared by exactly two triangles; 0 for a closed
     surface."""
     edges = np.sort(np.concatenate([nodes[:, [0, 1]], nodes[:, [1, 2]], nodes[:, [2, 0]]]), axis=1)

@@ -8,13 +8,14 @@ can be varied.
 import copy
 import itertools
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, file_key, number, read_toml, refuse_unknown
+from pneunet.base.files.toml import as_table, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import LAWS
+from pneunet.base.quantities import quantities
 from pneunet.base.system.processes import Limits
 from pneunet.geometry.designfile import design_from_tables, design_tables
 from pneunet.geometry.parameters import Segment
@@ -22,9 +23,9 @@ from pneunet.hifi.cell.file import cell_from_tables, cell_tables
 from pneunet.hifi.runs.cases import Case
 
 BODIES = ("cell", "segment", "manipulator")
-SEGMENT_KEYS = [file_key(f) for f in fields(Segment) if "unit" in f.metadata]
+SEGMENT_KEYS = list(quantities(Segment))
 MATERIAL_KEYS = ["silicone", "law"] + sorted(
-    {file_key(f) for law in LAWS.values() for f in fields(law)} - {"name", "source"}
+    {key for law in LAWS.values() for key in quantities(law)} - {"name", "source"}
 )
 #: keys which say what a material is: the table that stood there before means nothing any more
 NAMES_OF_MATERIALS = ("silicone", "law")
