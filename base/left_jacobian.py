@@ -33,7 +33,7 @@ def _series():
 _SERIES = _series()
 
 
-def commutator(twist):
+def commutator(twist: np.ndarray) -> np.ndarray:
     """ad (n, 6, 6) of twists (n, 6): ad(X) Y is the twist of the matrices' X Y - Y X."""
     W = hat(twist[:, :3])
     out = np.zeros((len(twist), 6, 6))
@@ -42,7 +42,7 @@ def commutator(twist):
     return out
 
 
-def adjoint(pose):
+def adjoint(pose: np.ndarray) -> np.ndarray:
     """Ad (n, 6, 6) of poses (n, 4, 4): a twist in a frame's axes seen from where the frame stands."""
     R = pose[:, :3, :3]
     out = np.zeros((len(pose), 6, 6))
@@ -51,7 +51,7 @@ def adjoint(pose):
     return out
 
 
-def wrench_commutator(wrench):
+def wrench_commutator(wrench: np.ndarray) -> np.ndarray:
     """C (n, 6, 6) of wrenches (n, 6) with ad(X)^T w = C(w) X."""
     moment, force = hat(wrench[:, :3]), hat(wrench[:, 3:])
     out = np.zeros((len(wrench), 6, 6))
@@ -63,7 +63,7 @@ class LeftJacobian:
     """matrix: J (n, 6, 6) of twists (n, 6), d exp(X) = hat_pose(J dX) exp(X); exact to rounding for turns up
     to 4 rad."""
 
-    def __init__(self, twist):
+    def __init__(self, twist: np.ndarray) -> None:
         self._twist = twist
         self._along = np.zeros_like(twist)  # dt/2 by the twist
         self._along[:, :3] = twist[:, :3]
@@ -78,7 +78,7 @@ class LeftJacobian:
         self.matrix += np.eye(6)
 
     @property
-    def pose(self):
+    def pose(self) -> np.ndarray:
         """exp(X) (n, 4, 4): its rotation and translation are in J."""
         V, out = self.matrix[:, :3, :3], np.zeros((len(self._twist), 4, 4))
         out[:, :3, :3] = np.eye(3) + self._ad[:, :3, :3] @ V
@@ -86,7 +86,7 @@ class LeftJacobian:
         out[:, 3, 3] = 1.0
         return out
 
-    def slope(self, wrench):
+    def slope(self, wrench: np.ndarray) -> np.ndarray:
         """(n, 6, 6): derivative by the twist of J^T w, for constant wrenches (n, 6)."""
         transposed, a, n = np.swapaxes(self._ad, 1, 2), self._a, len(wrench)
         y = np.empty((5, n, 6, 1))  # (ad^T)^i w

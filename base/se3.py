@@ -6,6 +6,7 @@ Introduction to Robotic Manipulation (1994), App. A; series below `SMALL` keep t
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 SMALL = 1e-4
 #: (4, 4), of poses; read only
@@ -24,7 +25,7 @@ def _generators():
 _GENERATORS = _generators()
 
 
-def hat(vector):
+def hat(vector: ArrayLike) -> np.ndarray:
     """Skew matrices (..., 3, 3) of vectors (..., 3): hat(a) b = a x b."""
     v = np.asarray(vector, float)
     return (v @ _GENERATORS[:3, :3, :3].reshape(3, 9)).reshape(v.shape[:-1] + (3, 3))
@@ -40,14 +41,14 @@ def _coefficients(angle):
     return a[..., None, None], b[..., None, None]
 
 
-def exp_rotation(vector):
+def exp_rotation(vector: ArrayLike) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
     W = hat(vector)
     a, b = _coefficients(np.linalg.norm(vector, axis=-1))
     return np.eye(3) + a * W + b * W @ W
 
 
-def log_rotation(rotation):
+def log_rotation(rotation: ArrayLike) -> np.ndarray:
     """Rotation vectors (..., 3) of rotation matrices (..., 3, 3), angle in [0, pi], through unit
     quaternions."""
     from scipy.spatial.transform import Rotation
@@ -56,13 +57,13 @@ def log_rotation(rotation):
     return Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-2] + (3,))
 
 
-def hat_pose(twist):
+def hat_pose(twist: ArrayLike) -> np.ndarray:
     """Matrices (..., 4, 4) of twists (..., 6), the exponents of their poses."""
     twist = np.asarray(twist, float)
     return (twist @ _GENERATORS.reshape(6, 16)).reshape(twist.shape[:-1] + (4, 4))
 
 
-def screw_basis(twist):
+def screw_basis(twist: ArrayLike) -> np.ndarray:
     """(..., 4, 4, 4): the powers 0 to 3 of X = hat_pose(twist), which exp(s X) is a combination of, since X^4
     = -|w|^2 X^2."""
     out = np.empty(np.shape(twist)[:-1] + (4, 4, 4))
@@ -72,7 +73,7 @@ def screw_basis(twist):
     return out
 
 
-def screw_coefficients(rate, s=1.0):
+def screw_coefficients(rate: np.ndarray, s: float | np.ndarray = 1.0) -> np.ndarray:
     """(..., 4) coefficients of `screw_basis` in exp(s X), for |w| = rate: 1, s, s^2 (1 - cos t)/t^2, s^3 (t -
     sin t)/t^3, t = s rate."""
     t = s * rate
@@ -87,7 +88,7 @@ def screw_coefficients(rate, s=1.0):
     return out
 
 
-def exp_pose(twist):
+def exp_pose(twist: ArrayLike) -> np.ndarray:
     """Poses (..., 4, 4) of twists (..., 6) = (rotation vector, translation part)."""
     twist = np.asarray(twist, float)
     w, v = twist[..., :3], twist[..., 3:]
@@ -102,7 +103,7 @@ def exp_pose(twist):
     return out
 
 
-def log_pose(pose):
+def log_pose(pose: ArrayLike) -> np.ndarray:
     """Twists (..., 6) of poses (..., 4, 4); inverse of `exp_pose` for rotation angles below pi."""
     pose = np.asarray(pose, float)
     w = log_rotation(pose[..., :3, :3])
@@ -116,7 +117,7 @@ def log_pose(pose):
     return np.concatenate([w, v], axis=-1)
 
 
-def inverse_pose(pose):
+def inverse_pose(pose: ArrayLike) -> np.ndarray:
     """Inverse rigid motions (..., 4, 4)."""
     pose = np.asarray(pose, float)
     Rt = np.swapaxes(pose[..., :3, :3], -1, -2)
@@ -127,7 +128,7 @@ def inverse_pose(pose):
     return out
 
 
-def make_pose(rotation, origin):
+def make_pose(rotation: ArrayLike, origin: ArrayLike) -> np.ndarray:
     """Poses (..., 4, 4) of rotations (..., 3, 3) and origins (..., 3)."""
     rotation, origin = np.asarray(rotation, float), np.asarray(origin, float)
     out = np.zeros(rotation.shape[:-2] + (4, 4))
@@ -135,6 +136,6 @@ def make_pose(rotation, origin):
     return out
 
 
-def transform(pose, points):
+def transform(pose: np.ndarray, points: ArrayLike) -> np.ndarray:
     """Points (n, 3) moved by one pose (4, 4)."""
     return np.asarray(points) @ pose[:3, :3].T + pose[:3, 3]

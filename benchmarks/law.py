@@ -22,7 +22,8 @@ def law():
     """The part `law`."""
     from pneunet.base.errors import InputError
     from pneunet.base.files.dataset import read_dataset
-    from pneunet.reduced.choice import DATA_SET, SHIPPED, read_law
+    from pneunet.reduced import read_law
+    from pneunet.reduced.choice import DATA_SET, SHIPPED
     from pneunet.reduced.training.train import digest, held_out_figures, judged_on, samples_of
 
     data, shipped = read_dataset(DATA_SET), read_law(SHIPPED)
@@ -68,8 +69,8 @@ def law():
 
 
 def slanted(shipped, data):
-    """{kind: [(angles, number of designs, *figures FREE)]} of a RodLaw on a data set's designs in BANDS of
-    angles."""
+    """{kind: [(angles, number of designs, *figures FREE)]} of a TrainedLaw on a data set's designs in BANDS
+    of angles."""
     from pneunet.reduced.training.judging import figures, misses
     from pneunet.reduced.training.states import sample_of
 
@@ -95,12 +96,12 @@ def _coarse(data):
 
 
 def costs(shipped):
-    """What calls of a RodLaw cost, the dearer kind's, CPU s on one core."""
+    """What calls of a TrainedLaw cost, the dearer kind's, CPU s on one core."""
     from pneunet.geometry import Manipulator
     from pneunet.geometry.reference_cases import CASES
     from pneunet.geometry.shape_numbers import shape_numbers
-    from pneunet.reduced import predict
-    from pneunet.reduced.choice import SHIPPED, read_law
+    from pneunet.reduced import predict, read_law
+    from pneunet.reduced.choice import SHIPPED
 
     kinds = {"twisting": CASES["twist_w12"](60.0, 5), "one-sided": CASES["one_sided_w10"](60.0, 6)}
     known = [segment for kind, segment in kinds.items() if kind in shipped.kinds]

@@ -47,7 +47,7 @@ def sweep(body, contact, size=SIZE):
         except (ConvergenceError, InputError) as error:
             reason = str(error)
     for j, state in enumerate(states[1:]):
-        strains[j] = [*state.strains.e, *state.strains.k]
+        strains[j] = state.strains.vector
     return strains, any(state.walls_overlap for state in states), reason
 
 
@@ -78,7 +78,7 @@ def curves(strains, angles):
     from pneunet.base.strains import RodStrains
     from pneunet.reduced.analytic.calibration import TwistCurves
 
-    rod = RodStrains(strains[..., :3], strains[..., 3:])
+    rod = RodStrains.of_vector(strains)
     return TwistCurves(np.array(angles), np.array(PRESSURES), rod.twist_per_deformed_length, rod.stretch)
 
 
@@ -90,8 +90,8 @@ def distance(model, wanted):
 def twisting(cells, angles):
     """{case: tube as it is, fits, and their curves} from {case: strains with contact}."""
     from pneunet.reduced.analytic.calibration import calibrate_tube, tube_curves
+    from pneunet.reduced.analytic.law import segment_tube
     from pneunet.reduced.analytic.twisting import PAPER_FIBRE_MODULUS
-    from pneunet.reduced.model import segment_tube
 
     found = {}
     for case, strains in cells.items():
@@ -158,7 +158,7 @@ def one_sided(strains, angles):
                 "curvature": curvature,
             }
         )
-    model = [np.concatenate(HelicalCell(body).strains(PRESSURES), axis=1) for body in bodies]
+    model = [HelicalCell(body).strains(PRESSURES).vector for body in bodies]
     return {"rows": rows, "model": np.array(model)}
 
 

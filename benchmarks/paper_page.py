@@ -1,6 +1,8 @@
 """docs/paper-models.md and its picture, from the details of the part `paper` (benchmarks/paper.py)."""
 
 import textwrap
+import tomllib
+from pathlib import Path
 
 import numpy as np
 
@@ -25,59 +27,8 @@ WIDTH = 135
 SHOWN = "twist_w15"
 KPA = [round(p * 1e3) for p in PRESSURES]
 
-ABOUT = """\
-Jiang et al., Appl. Phys. Rev. 8, 041416 (2021), "the paper", has a theory of the twisting segment (a tube
-with fibres, Eqs 1-21) and one of the helical segment (in its supplement, which is lost). Here both, in
-the forms of [theory-reduced.md](theory-reduced.md), stand beside the finite elements: as they are, with
-nothing fitted, and with their constants fitted to the very cells they are compared with, which is the
-best that they can do. tau is per deformed length."""
-CELLS = """\
-Unit cells (one pitch of a long segment, screw-periodic, P2/P1, h = {size:g} mm) of the cases {cases} at
-mu = 0.317 MPa (w10: 0.2068) and of one-sided-w10 at 0.2068, angles {angles} degrees (one-sided: 90 too),
-10 to 50 kPa. Cells were solved without contact and, where walls meet by 50 kPa, again with it
-([contact.md](contact.md)); "with contact" is what all comparisons are with. Walls meet: {touch}.
-{failures} The paper's own geometry is not among them: dimensions of its twisting segment stood in the
-supplement. Of ours twist-w15 has the paper's c1 = 0.27 if the isotropic part is the core (its 15 x 4 mm
-of the mean outline's area are 0.26; w12 0.38, w10 0.38). Mesh: {checked} without contact at h = {finer:g}
-mm twists at 50 kPa by {ratios} times as much at {checked_angles} degrees. Cells at less than 30 degrees
-are not meshed."""
-TWIST = """\
-tau of {case} in rad/m, with contact (without):"""
-HIGHEST = """\
-Angle of the largest tau, from a cubic through the computed angles; "30" means that tau still grows at the
-smallest angle that was computed. The paper: {paper_angle:g} degrees at 50 kPa, with {paper_tau:g} rad/mm."""
-TUBE = """\
-*as it is*: E_t = 3 mu, Ri and Ro from equal areas. Fits minimise the sum of the squared errors of tau and
-of stretch - 1 over all angles and pressures, each error a root mean square over that of the cells (0 =
-perfect, 1 = no better than a tube that does not move); tau's distance is |tau/tau_FE - 1|, states that a
-tube does not have below its limit load count as 1."""
-CONVENTION = """\
-The convention: A on (Z, Psi) is (cos, sin) in `axial`, as below Eq. 3 and as a chamber runs, (sin, cos)
-in `hoop`, as in Eqs 11-13. In the tube one is the other at the complementary angle, so wherever the axial
-tube twists most, the hoop tube does at 90 degrees less that."""
-SLOPE = """\
-The tube's tau(P) is convex wherever it follows: tau at 50 kPa over five times tau at 10 kPa (1 = a
-straight line) at 60 degrees is"""
-ANCHORS = """\
-The paper's numbers: tau is at most {paper_tau:g} rad/mm (also printed as 0.0325) at 50 kPa, at
-{paper_angle:g} degrees, and {paper_10:g} at 10 kPa; "the slope of tau decreases with P". These do not go
-together: with a falling slope tau at {paper_angle:g} degrees and 50 kPa is less than five times that at
-10 kPa, 0.0315 at most. Tubes (axial, mu = 0.317 MPa) made as large as it takes to reach {paper_tau:g}:"""
-PRINTED = """\
-The printed constants and equations (`python -m reduced.analytic.printed`; Ri = 3, Ro = 7 mm): with E_t =
-0.008 MPa the consistent tube twists by at most {largest:.2g} rad/mm at any angle and pressure below its
-limit load, a {share:.0f}th of the paper's figure. With the radii of our cases it is a median {printed}
-off, beyond its limit load in {lost:.0f} % of the states. The printed equations have no solution (relative
-residual at least {unknown:.2g}, or {pressure:.2g} if their P is taken for the pressure)."""
-HELIX = """\
-Chambers that open across themselves alone bend an oblique strip: k1/k2 = cot(theta), hence P_t kappa_h =
-2 pi cot(theta) (the paper's kappa_h is 1 over the radius of the helix's cylinder, P_t its pitch). The
-paper's octopus target obeys it: 70 1/m times 90 mm = 6.30 is 2 pi cot(44.9). P_t kappa_h / (2 pi
-cot(theta)) of one-sided-w10 on the channel's axis, in brackets of the line along the bottom:"""
-SOFTNESS = """\
-|k| of a screw does not depend on its line. Fitted: a factor on the pressure (the same as one on 1/mu),
-and a power of 1/sin(theta)
-to it:"""
+#: name -> paragraph
+TEXT = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())
 
 
 def _prose(text, **facts):
@@ -161,19 +112,19 @@ def _cells_section(d):
         ratios=" and ".join(f"{r:.3f}" for r in ratios),
         checked_angles=" and ".join(f"{a:g}" for a in CHECKED_ANGLES),
     )
-    return ["## The cells", "", *_prose(CELLS, **facts)]
+    return ["## The cells", "", *_prose(TEXT["cells"], **facts)]
 
 
 def _twist_section(d):
     with_contact, without = (_tau(d["cells"][SHOWN][contact]) for contact in ("auto", "none"))
-    lines = ["", "## tau(P, theta)", "", *_prose(TWIST, case=_case(SHOWN)), ""]
+    lines = ["", "## tau(P, theta)", "", *_prose(TEXT["twist"], case=_case(SHOWN)), ""]
     rows = [
         [f"{angle:g}", *(f"{_number(a)} ({_number(b)})" for a, b in zip(held, free))]
         for angle, held, free in zip(ANGLES, with_contact, without)
     ]
     lines += table(["theta, deg", *(f"{p} kPa" for p in KPA)], rows)
     lines += ["", f"![tau over theta and P, and the helix]({PICTURE})", "", "## Where tau is largest", ""]
-    lines += [*_prose(HIGHEST, paper_angle=PAPER_ANGLE, paper_tau=PAPER_TAU), ""]
+    lines += [*_prose(TEXT["highest"], paper_angle=PAPER_ANGLE, paper_tau=PAPER_TAU), ""]
     rows = []
     for name in TWISTING:
         kinds = [("FE, with contact", _tau(d["cells"][name]["auto"]))]
@@ -193,7 +144,7 @@ def _fit_name(row):
 
 
 def _tube_section(d):
-    lines = ["", "## The tube's constants", "", *_prose(TUBE), ""]
+    lines = ["", "## The tube's constants", "", *_prose(TEXT["tube"]), ""]
     rows = []
     for name in TWISTING:
         for row in d["tubes"][name]:
@@ -218,7 +169,7 @@ def _tube_section(d):
         "tau's distance: median; worst",
     ]
     lines += table(head, rows)
-    lines += ["", *_prose(CONVENTION + " " + _verdict(d)), ""]
+    lines += ["", *_prose(TEXT["convention"] + " " + _verdict(d)), ""]
     at = ANGLES.index(60.0)
     ratio = {
         name: (
@@ -233,7 +184,7 @@ def _tube_section(d):
         if tau[-1]
     )
     return lines + _prose(
-        f"{SLOPE} {text}. No fit changes that, and it is most of what is left of the error."
+        f"{TEXT['slope']} {text}. No fit changes that, and it is most of what is left of the error."
     )
 
 
@@ -257,19 +208,18 @@ def _verdict(d):
                 tube = row["tube"]
                 moduli += [tube["fibre_modulus"] / tube["mu"]] if tube["fibre_convention"] == "axial" else []
                 hoop += [tube["outer_radius"]] if tube["fibre_convention"] == "hoop" else []
-    return (
-        f"Sum of squared errors, hoop over axial ({', '.join(map(_case, TWISTING))}): {'; '.join(texts)}."
-        f" Hoop fits with free radii end at outer radii of {min(hoop):.2g} to {max(hoop):.2g} mm, which is no"
-        " such segment: what they gain is the place of the largest tau. So the data speak for `axial`, with"
-        f" E_t/mu of {min(moduli):.2g} to {max(moduli):.2g} when the radii are free; the valley of that fit"
-        " is flat (a thicker tube of stiffer fibres does nearly as well), and E_t/mu is not the same in the"
-        " three cases."
+    return TEXT["verdict"].format(
+        names=", ".join(map(_case, TWISTING)), ratios="; ".join(texts), hoop=_span(hoop), moduli=_span(moduli)
     )
+
+
+def _span(values):
+    return f"{min(values):.2g} to {max(values):.2g}"
 
 
 def _paper_section(d):
     facts = dict(paper_tau=PAPER_TAU, paper_angle=PAPER_ANGLE, paper_10=PAPER_TAU_10KPA)
-    lines = ["", "## The paper's numbers", "", *_prose(ANCHORS, **facts), ""]
+    lines = ["", "## The paper's numbers", "", *_prose(TEXT["anchors"], **facts), ""]
     rows = [
         [
             f"{r['modulus']:g}",
@@ -309,7 +259,7 @@ def _paper_section(d):
         printed=f"{min(medians):.0f} to {max(medians):.0f} %",
         **printed["residuals"],
     )
-    return lines + ["", *_prose(PRINTED, **facts)]
+    return lines + ["", *_prose(TEXT["printed"], **facts)]
 
 
 def _helix_section(d):
@@ -318,7 +268,7 @@ def _helix_section(d):
     strains, model = _array(d["cells"][ONE_SIDED]["auto"]), _array(d["bending"]["model"])
     bottom = segment(ONE_SIDED, 60.0, ONE_SIDED_MU).core_bottom
     axis, below, ours = _helix(strains, 0.0), _helix(strains, bottom), _helix(model, 0.0)
-    lines = ["", "## Does P_t kappa_h = 2 pi cot(theta) hold?", "", *_prose(HELIX), ""]
+    lines = ["", "## Does P_t kappa_h = 2 pi cot(theta) hold?", "", *_prose(TEXT["helix"]), ""]
     rows = [
         [
             f"{angle:g}",
@@ -335,14 +285,8 @@ def _helix_section(d):
         ],
         rows,
     )
-    low, high = np.nanmin(axis), np.nanmax(axis)
-    text = (
-        f"It does not: in the cells the ratio is {low:.2f} to {high:.2f} on the channel's axis. It falls with"
-        " pressure and depends on "
-    )
-    text += "the line that one calls the centreline; at low pressure the helix is steeper than the strip's."
-    lines += ["", *_prose(text)]
-    lines += ["", "## Curvature", "", *_prose(SOFTNESS), ""]
+    lines += ["", *_prose(TEXT["ratio"], low=np.nanmin(axis), high=np.nanmax(axis))]
+    lines += ["", "## Curvature", "", *_prose(TEXT["softness"]), ""]
     rows = []
     for row in d["bending"]["rows"]:
         softness, slant = row["constants"]
@@ -367,47 +311,24 @@ def _summary_section(d):
     at = [_highest_text(_tau(d["cells"][name]["auto"])[:, -1]) for name in TWISTING]
     names = ", ".join(map(_case, TWISTING))
     largest = [np.nanmax(_tau(d["cells"][name]["auto"])) for name in TWISTING]
-    points = [
-        (
-            "*3a, experiments*: no numbers are given, nothing to compare with. *3b, 3c*: shapes; ours are of"
-            " other dimensions."
-        ),
-        (
-            f"*3d, tau(P)*: in the cells of {_case(SHOWN)} with contact the slope of tau falls at"
-            f" {sum(falls)} of the three angles 75, 60, 45 degrees, and that of the stretch rises at"
-            f" {sum(grows)}. The consistent tube has the second; no tube on this page has the first. The"
-            " curves' numbers are only in the picture."
-        ),
-        (
-            f"*Contact as the reason for the misfit at 45 degrees*: contact adds {added} degrees to the twist"
-            f" at 50 kPa in {_case(SHOWN)}: it is largest at {ANGLES[most]:g}, and no reason for 45 degrees"
-            " alone to be off."
-        ),
-        (
-            f"*3e, 3f, the maximum*: the tube with axial fibres has it near {PAPER_ANGLE:g} degrees, and a"
-            f" size can be found for {PAPER_TAU:g} rad/mm (table above); the printed constants give a tenth"
-            f" or less. The cells do not have it there, but, at 50 kPa with contact, at {'; '.join(at)} deg"
-            f" (rad/m) in {names}."
-        ),
-        (
-            f"*Magnitude*: the cells' largest twist is {min(largest):.0f} to {max(largest):.0f} rad/m at 50"
-            " kPa, the paper's 33: of the same order, and more cannot be said without its dimensions."
-        ),
-        (
-            "*E_t = 0.008 MPa*: not reproduced: the printed equations have no solution, the consistent form"
-            " no such twist (either convention)."
-        ),
-        (
-            "Not tried: geometries other than the three cases, friction, the experiment's clamped ends,"
-            " materials other than neo-Hookean."
-        ),
-    ]
+    facts = dict(
+        case=_case(SHOWN),
+        names=names,
+        added=added,
+        falls=sum(falls),
+        grows=sum(grows),
+        most=ANGLES[most],
+        at="; ".join(at),
+        low=min(largest),
+        high=max(largest),
+        paper_angle=PAPER_ANGLE,
+        paper_tau=PAPER_TAU,
+    )
     lines = ["", "## Fig. 3: what could be reproduced and what not", ""]
-    return lines + [
-        line
-        for point in points
-        for line in textwrap.wrap(f"- {point}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
-    ]
+    for point in TEXT["summary"]:
+        text = f"- {point.format(**facts)}"
+        lines += textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    return lines
 
 
 def page(meta, folder):
@@ -418,7 +339,7 @@ def page(meta, folder):
         "Made by `make bench ONLY=paper` and `python -m benchmarks --snapshot` (benchmarks/paper.py); do not"
         " edit."
     )
-    lines = ["# The paper's models beside finite elements", "", made, "", *_prose(ABOUT), ""]
+    lines = ["# The paper's models beside finite elements", "", made, "", *_prose(TEXT["about"]), ""]
     for section in (
         _cells_section,
         _twist_section,

@@ -23,7 +23,8 @@ def remeshed():
     from pneunet.hifi.runs.campaign.extension import Known
     from pneunet.hifi.runs.campaign.file import read_campaign
     from pneunet.hifi.runs.cases import run_cases
-    from pneunet.reduced.choice import DATA_SET, SHIPPED, read_law
+    from pneunet.reduced import read_law
+    from pneunet.reduced.choice import DATA_SET, SHIPPED
     from pneunet.reduced.training.states import sample_of
 
     campaign = read_campaign(CAMPAIGN)

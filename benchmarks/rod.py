@@ -32,15 +32,15 @@ def four_segments():
     """A Rod of four segments of both kinds: the analytic model's free strains, the bare cores' stiffness."""
     from pneunet.geometry import Manipulator
     from pneunet.geometry.reference_cases import CASES
-    from pneunet.reduced import AnalyticModel, QuadraticLaw, Rod
-    from pneunet.reduced.rod.laws import passive_law
+    from pneunet.reduced import AnalyticLaw, QuadraticLaw, Rod
+    from pneunet.reduced.rod.quadratic import passive_law
 
     twist, bend = CASES["twist_w12"], CASES["one_sided_w10"]
     body = Manipulator((twist(60.0, 5), bend(60.0, 6), twist(120.0, 5), bend(90.0, 6)))
     laws = []
     for segment in body.segments:
-        strains = AnalyticModel().strains(segment, PRESSURE)
-        laws.append(QuadraticLaw([PRESSURE], [[*strains.e, *strains.k]], passive_law(segment).stiffnesses))
+        strains = AnalyticLaw().strains(segment, PRESSURE)
+        laws.append(QuadraticLaw([PRESSURE], [strains.vector], passive_law(segment).stiffnesses))
     return Rod.of(body, laws, PRESSURE)
 
 
@@ -48,13 +48,12 @@ def speed():
     """The part `rod`."""
     from pneunet.base.strains import RodStrains
     from pneunet.geometry.loading import DeadLoads
-    from pneunet.reduced import free_shapes
-    from pneunet.reduced.rod import centreline
+    from pneunet.reduced import centreline, free_shapes
 
     rod, gravity = four_segments(), DeadLoads((0.0, 0.0, -9810.0))
     lengths, strains = rod.lengths, rod.free_strains
     spacing = lengths.sum() / 195
-    many = RodStrains(np.tile(strains.e, (1000, 1, 1)), np.tile(strains.k, (1000, 1, 1)))
+    many = RodStrains.of_vector(np.tile(strains.vector, (1000, 1, 1)))
     rows = np.tile(lengths, (1000, 1))
     state = rod.equilibrium(gravity)
     details = {
@@ -124,9 +123,7 @@ def against_finite_elements():
                 for fe in [m for m in seen if m.pressure in marks]:
                     tip, rms = compare(Rod.of(body, law, fe.pressure), loads, fe)
                     bare_tip, bare_rms = compare(Rod.of(body, law, fe.pressure, end_effects=False), loads, fe)
-                    trained_tip, trained_rms = compare(
-                        Rod.of(body, trained.of(body.segments[0]), fe.pressure), loads, fe
-                    )
+                    trained_tip, trained_rms = compare(Rod.of(body, trained, fe.pressure), loads, fe)
                     row = {
                         "case": f"{name}, {angle:g} deg, {what}",
                         "pressure_kPa": fe.pressure * 1e3,

@@ -1,6 +1,7 @@
 """`Design`: a manipulator at its pressure, with what the reduced model says of it and the ways on from
 there."""
 
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,9 +22,9 @@ from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.choice import choose_law
-from pneunet.reduced.rod.prediction import doubts, predict
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.prediction import doubts, predict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from pneunet.design.report.rundata import Solution
 
 LARGEST_PRESSURE_KPA = 2000.0
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -144,13 +146,18 @@ class Design:
         """A matplotlib figure of target and prediction, with errors and segments."""
         from pneunet.design.report.pictures import design_figure
 
-        return design_figure(self)
+        return design_figure(self.content, self.prediction, self.target, self.errors)
 
     def draw(self, path: str | Path) -> bool:
         """Write the figure as a PNG; False, with a line in the log, without matplotlib."""
-        from pneunet.design.report.pictures import draw_design
+        from pneunet.base.pictures.rendering import save
 
-        return draw_design(self, path)
+        try:
+            save(self.plot(), path)
+        except ImportError:
+            log.info("no picture: matplotlib is missing, install it with: pip install 'pneunet[pictures]'")
+            return False
+        return True
 
     def solve(
         self,

@@ -10,14 +10,15 @@ import numpy as np
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import atomic_path, output_directory, write_csv
 from pneunet.base.files.record import write_record
+from pneunet.base.files.schemas import SHAPES
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.design.design import checked_kPa
 from pneunet.design.report.labels import plain
 from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import read_design_file
 from pneunet.reduced.choice import choose_law
-from pneunet.reduced.rod.prediction import doubts, predict
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.prediction import doubts, predict
 
 log = logging.getLogger(__name__)
 STEPS = 5
@@ -60,7 +61,7 @@ def run_shape(
         raise ConvergenceError(f"no shape at {_list(failed)} kPa: {next(iter(failed.values()))}")
     write_csv(
         folder / "centrelines.csv",
-        ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"],
+        SHAPES,
         [[p * KPA_PER_MPA, s, *point] for p, line in shapes.items() for s, point in zip(line.s, line.points)],
     )
     log.info(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")

@@ -1,53 +1,23 @@
 """design.toml: a manipulator, its pressure and where its base stands, complete and re-runnable."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError
+from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import write_text
-from pneunet.base.files.toml import (
-    as_table,
-    from_table,
-    number,
-    read_toml,
-    refuse_unknown,
-    to_table,
-    toml_text,
-)
-from pneunet.base.materials.laws import material_from_table, material_to_table
-from pneunet.geometry.loading import (
-    CONTACTS,
-    CONTROL_KEYS,
-    Control,
-    DeadLoads,
-    Extras,
-    read_contact,
-    read_control,
-    read_extras,
-)
+from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown, to_table, toml_text
+from pneunet.base.materials.laws import Hyperelastic, material_from_table, material_to_table
+from pneunet.base.quantities import Checked, quantities, quantity
+from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_control
 from pneunet.geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
-KEYS = [
-    *(
-        "schema",
-        "name",
-        "pressure_kPa",
-        "mesh_size_mm",
-        "target",
-        "material",
-        "layer_material",
-        "segment",
-        "base",
-        "result",
-    ),
-    *("loads", "measure", "contact", *CONTROL_KEYS),
-]
 
 
 @dataclass(frozen=True)
-class Design:
+class DesignFile(Checked):
     """What the commands mesh, shape and solve read.
 
     pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm;
@@ -58,71 +28,68 @@ class Design:
     """
 
     manipulator: Manipulator
-    pressure: float
-    name: str = "design"
+    pressure: float = quantity("kPa", low=0, high=2000)
+    name: str = quantity(None, "design")
     base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
-    mesh_size: float = 2.0
-    target: str = ""
+    mesh_size: float = quantity("mm", 2.0, low=0.1, high=20)
+    target: str = quantity(None, "")
     result: dict = field(default_factory=dict)
     loads: DeadLoads = DeadLoads()
     control: Control = Control()
     measure: Extras = Extras()
-    contact: str = CONTACTS[0]
+    contact: str = quantity(None, CONTACTS[0], choices=CONTACTS)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.pressure == 0 and not self.loads:
+            raise InputError("pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads]")
 
 
-def read_design(path):
-    """The Design in a TOML file; InputError with file, table and key otherwise."""
+TABLES = ("material", "layer_material", "segment", "base", "result", "loads", "measure")
+KEYS = ("schema", *quantities(DesignFile), *CONTROL_KEYS, *TABLES)
+
+
+def read_design_file(path: str | Path) -> DesignFile:
+    """The DesignFile in a TOML file; InputError with file, table and key otherwise."""
     return design_from_tables(read_toml(path), str(path))
 
 
-def design_from_tables(data, path):
-    """The Design in the tables of a design.toml; `path` is what errors call them."""
-    refuse_unknown(data, KEYS, str(path))
+def design_from_tables(data: dict, path: str) -> DesignFile:
+    """The DesignFile in the tables of a design.toml; `path` is what errors call them."""
+    refuse_unknown(data, KEYS, path)
     if data.get("schema", SCHEMA) != SCHEMA:
         raise InputError(f"{path}: schema = '{data['schema']}' is not '{SCHEMA}'")
     for key in ("pressure_kPa", "material", "segment"):
         if key not in data:
             raise InputError(f"{path}: key '{key}' is missing")
-    pressure = number(data["pressure_kPa"], "pressure_kPa", str(path))
-    loads = from_table(DeadLoads, as_table(data.get("loads", {}), f"{path} [loads]"), f"{path} [loads]")
-    if not 0 <= pressure <= 2000:
-        raise InputError(f"{path}: pressure_kPa = {pressure:g} must lie in 0..2000 kPa")
-    if pressure == 0 and not loads:
-        raise InputError(f"{path}: pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads]")
-    mesh_size = number(data.get("mesh_size_mm", 2.0), "mesh_size_mm", str(path))
-    if not 0.1 <= mesh_size <= 20:
-        raise InputError(f"{path}: mesh_size_mm = {mesh_size:g} must lie in 0.1..20 mm")
-    material = material_from_table(data["material"], f"{path} [material]")
-    layer_material = (
-        material_from_table(data["layer_material"], f"{path} [layer_material]")
-        if "layer_material" in data
-        else None
-    )
     if not isinstance(data["segment"], list):
         raise InputError(f"{path}: segments are written [[segment]], with double brackets")
-    segments = []
-    for i, row in enumerate(data["segment"], start=1):
-        segments.append(segment_from_table(row, f"{path} [[segment]] {i}", material, layer_material))
-    try:
+    materials = [
+        material_from_table(data[key], f"{path} [{key}]") if key in data else None
+        for key in ("material", "layer_material")
+    ]
+    segments = [
+        segment_from_table(row, f"{path} [[segment]] {i}", *materials)
+        for i, row in enumerate(data["segment"], start=1)
+    ]
+    with located(path):
         manipulator = Manipulator(tuple(segments))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return Design(
-        manipulator,
-        pressure * 1e-3,
-        name=str(data.get("name", "design")),
+    return from_table(
+        DesignFile,
+        {key: data[key] for key in quantities(DesignFile) if key in data},
+        path,
+        manipulator=manipulator,
         base_pose=_base_pose(data.get("base", {}), f"{path} [base]"),
-        mesh_size=float(mesh_size),
-        target=str(data.get("target", "")),
         result=as_table(data.get("result", {}), f"{path} [result]"),
-        loads=loads,
-        control=read_control(data, str(path)),
-        measure=read_extras(data.get("measure", {}), f"{path} [measure]"),
-        contact=read_contact(data, str(path)),
+        loads=from_table(DeadLoads, data.get("loads", {}), f"{path} [loads]"),
+        control=read_control(data, path),
+        measure=from_table(Extras, data.get("measure", {}), f"{path} [measure]"),
     )
 
 
-def segment_from_table(row, where, material, layer_material=None):
+def segment_from_table(
+    row: dict, where: str, material: Hyperelastic | None, layer_material: Hyperelastic | None = None
+) -> Segment:
     """The Segment in a TOML table, its materials the ones given unless it has its own."""
     row = as_table(row, where)
     own = row.pop("material", None)
@@ -153,52 +120,37 @@ def _base_pose(table, where):
     return pose
 
 
-def design_tables(design):
+def design_tables(design: DesignFile) -> dict:
     """The nested tables of design.toml; a segment's material is written only where it differs from the first
     one's, a layer's with every layer."""
     first = design.manipulator.segments[0].material
-    rows = []
-    for s in design.manipulator.segments:
-        row = to_table(s)
-        if s.material != first:
-            row["material"] = material_to_table(s.material)
-        if s.layer_material is not None:
-            row["layer_material"] = material_to_table(s.layer_material)
-        rows.append(row)
-    tables = {
-        "schema": SCHEMA,
-        "name": design.name,
-        "pressure_kPa": float(f"{design.pressure * 1e3:.12g}"),
-        "mesh_size_mm": design.mesh_size,
-    }
-    tables |= design.control.table()
-    if design.contact != CONTACTS[0]:
-        tables["contact"] = design.contact
-    if design.target:
-        tables["target"] = design.target
+    rows = body_tables(design.manipulator)
+    for row, segment in zip(rows, design.manipulator.segments):
+        if segment.material == first:
+            del row["material"]
+    tables = {"schema": SCHEMA} | to_table(design) | design.control.table()
+    for key, usual in (("target", ""), ("contact", CONTACTS[0])):
+        if tables[key] == usual:
+            del tables[key]
     tables["material"] = material_to_table(first)
     tables["segment"] = rows
     tables["base"] = {"origin_mm": design.base_pose[:3, 3], "rotation": design.base_pose[:3, :3]}
-    if design.loads:
-        tables["loads"] = design.loads.table()
-    if any(asdict(design.measure).values()):
-        tables["measure"] = asdict(design.measure)
-    if design.result:
-        tables["result"] = design.result
-    return tables
+    measure = to_table(design.measure)
+    others = {"loads": design.loads.table(), "measure": measure if any(measure.values()) else {}}
+    return tables | {key: table for key, table in (others | {"result": design.result}).items() if table}
 
 
-def body_tables(manipulator):
+def body_tables(manipulator: Manipulator) -> list[dict]:
     """What a solution belongs to: every dimension and material of every segment, in file units."""
-    layers = [
-        {} if s.layer_material is None else {"layer_material": material_to_table(s.layer_material)}
-        for s in manipulator.segments
-    ]
-    return [
-        {**to_table(s), "material": material_to_table(s.material), **layer}
-        for s, layer in zip(manipulator.segments, layers)
-    ]
+    rows = []
+    for segment in manipulator.segments:
+        row = to_table(segment) | {"material": material_to_table(segment.material)}
+        if segment.layer_material is not None:
+            row["layer_material"] = material_to_table(segment.layer_material)
+        rows.append(row)
+    return rows
 
 
-def write_design(path, design):
+def write_design_file(path: str | Path, design: DesignFile) -> None:
+    """Write the DesignFile as TOML, complete: `read_design_file` reads it back."""
     write_text(path, toml_text(design_tables(design)))

@@ -6,9 +6,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, file_key, number, quantity, refuse_unknown, to_table
+from pneunet.base.files.toml import from_table, to_table
+from pneunet.base.quantities import Checked, quantities, quantity
 
 CONTROLS = ("pressure", "volume", "arc length")
+#: of the walls of neighbouring chambers: held apart where they touch, or not
+CONTACTS = ("auto", "none")
 
 
 @dataclass(frozen=True)
@@ -25,101 +28,60 @@ class DeadLoads:
     tip_force: tuple = quantity("N", (0.0, 0.0, 0.0))
     tip_moment: tuple = quantity("N_mm", (0.0, 0.0, 0.0))
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         return any(any(getattr(self, f.name)) for f in fields(self))
 
-    def in_body(self, base_pose):
+    def in_body(self, base_pose: np.ndarray) -> "DeadLoads":
         """The same loads in the body's axes, for a base that stands at `base_pose` (4, 4)."""
         turn = np.asarray(base_pose)[:3, :3].T
         return DeadLoads(*(tuple(map(float, turn @ getattr(self, f.name))) for f in fields(self)))
 
-    def text(self):
+    def text(self) -> str:
         """The loads that act, in words; '' without any."""
-        words = []
-        for key, value in self.table().items():
-            name, unit = (
-                ("gravity", "m/s2")
-                if "gravity" in key
-                else ("tip force", "N")
-                if "force" in key
-                else ("tip moment", "N mm")
-            )
-            words.append(f"{name} ({', '.join(f'{v:g}' for v in value)}) {unit}")
-        return ", ".join(words)
+        names = {"gravity_m_per_s2": "gravity ({}) m/s2", "tip_force_N": "tip force ({}) N"}
+        names["tip_moment_N_mm"] = "tip moment ({}) N mm"
+        acting = self.table().items()
+        return ", ".join(names[key].format(", ".join(f"{v:g}" for v in value)) for key, value in acting)
 
-    def table(self):
+    def table(self) -> dict:
         """The loads that act, as in [loads]; empty without any."""
         return {key: value for key, value in to_table(self).items() if any(value)}
 
 
 @dataclass(frozen=True)
-class Control:
+class Control(Checked):
     """What is prescribed along the path: 'pressure' up to the design's; 'volume' of the cavity up to
     `volume_factor` times the one at rest, which walks through limit points of the pressure; or 'arc length',
     root mean square displacement of the nodes summed along the path, up to `arc_length` mm, which walks
     through any limit point."""
 
-    name: str = "pressure"
-    volume_factor: float = quantity(None, 2.0)
-    arc_length: float = quantity("mm", 10.0)
+    name: str = quantity(None, "pressure", key="control", choices=CONTROLS)
+    volume_factor: float = quantity(None, 2.0, low=1.001, high=100)
+    arc_length: float = quantity("mm", 10.0, low=1e-3, high=1e4)
 
-    def table(self):
+    def table(self) -> dict:
         """The keys that say so in a file; empty for pressure control."""
-        key = {"volume": "volume_factor", "arc length": "arc_length_mm"}.get(self.name)
-        return {"control": self.name, key: getattr(self, key.removesuffix("_mm"))} if key else {}
+        own = ("control", *(key for key, name in CONTROL_OF.items() if name == self.name))
+        return {key: value for key, value in to_table(self).items() if key in own} if len(own) > 1 else {}
 
 
-CONTROL_KEYS = ["control", *(file_key(f) for f in fields(Control) if "unit" in f.metadata)]
+CONTROL_KEYS = tuple(quantities(Control))
+#: key -> the control that it goes with
+CONTROL_OF = {"volume_factor": "volume", "arc_length_mm": "arc length"}
 
 
-def read_control(table, where):
+def read_control(table: dict, where: str) -> Control:
     """The Control among the keys of a file's top table; InputError otherwise."""
-    name = table.get("control", Control.name)
-    if name not in CONTROLS:
-        raise InputError(
-            f"{where}: control = {name!r} is not known: write 'pressure', 'volume' or 'arc length'"
-        )
-    values = {}
-    for key, owner, low, high in (
-        ("volume_factor", "volume", 1.001, 100.0),
-        ("arc_length_mm", "arc length", 1e-3, 1e4),
-    ):
-        if key not in table:
-            continue
-        value = float(number(table[key], key, where))
-        if name != owner:
-            raise InputError(f'{where}: {key} goes with control = "{owner}": write that too, or leave it out')
-        if not low <= value <= high:
-            raise InputError(f"{where}: {key} = {value:g} must lie in {low:g}..{high:g}")
-        values[key.removesuffix("_mm")] = value
-    return Control(name, **values)
-
-
-#: of the walls of neighbouring chambers: held apart where they touch, or not
-CONTACTS = ("auto", "none")
-
-
-def read_contact(table, where):
-    """The `contact` among the keys of a file's top table; InputError otherwise."""
-    name = table.get("contact", CONTACTS[0])
-    if name not in CONTACTS:
-        raise InputError(f"{where}: contact = {name!r} is not known: write 'auto' or 'none'")
-    return name
+    control = from_table(Control, {key: table[key] for key in CONTROL_KEYS if key in table}, where)
+    for key, name in CONTROL_OF.items():
+        if key in table and name != control.name:
+            raise InputError(f'{where}: {key} goes with control = "{name}": write that too, or leave it out')
+    return control
 
 
 @dataclass(frozen=True)
 class Extras:
     """What is computed at the end beside the shape; see hifi.body.tip."""
 
-    tip_stiffness: bool = False
-    blocked_force: bool = False
-
-
-def read_extras(table, where):
-    """The Extras of a [measure] table of true and false."""
-    known = [f.name for f in fields(Extras)]
-    refuse_unknown(as_table(table, where), known, where)
-    for key, value in table.items():
-        if not isinstance(value, bool):
-            raise InputError(f"{where}: '{key}' must be true or false, not {value!r}")
-    return Extras(**table)
+    tip_stiffness: bool = quantity(None, False)
+    blocked_force: bool = quantity(None, False)

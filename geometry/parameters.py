@@ -8,74 +8,51 @@ bending cancels.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import quantity
 from pneunet.base.materials.laws import Hyperelastic, NeoHookean
+from pneunet.base.quantities import Checked, quantity
 
 ONE_SIDED, TWISTING = "one-sided", "twisting"
 KINDS = (ONE_SIDED, TWISTING)
+_size = partial(quantity, "mm", above=0, low=0.05, high=500, hint="not a castable size; is it in metres?")
 
 
 @dataclass(frozen=True)
-class Segment:
+class Segment(Checked):
     """One run of equal chambers. "normal" = across the chamber."""
 
-    kind: str = quantity(None, note="'one-sided' (bends, helical away from 90 deg) or 'twisting'")
-    angle: float = quantity(
-        "deg", note="between the chambers' long side and the x axis; 90 = across the beam"
+    kind: str = quantity(
+        None, note="'one-sided' (bends, helical away from 90 deg) or 'twisting'", choices=KINDS
     )
-    chambers: int = quantity(None, note="whole chambers (pairs, for a twisting segment)")
-    width: float = quantity("mm", 12.0, "body width")
-    chamber_height: float = quantity("mm", 4.0, "cavity, floor to ceiling")
-    cavity_thickness: float = quantity("mm", 2.0, "cavity, normal")
-    wall: float = quantity("mm", 1.0, "between cavity and gap, normal")
-    gap: float = quantity("mm", 1.0, "between neighbouring chambers, normal")
-    top_wall: float = quantity("mm", 1.0, "above the cavity")
-    side_wall: float = quantity("mm", 1.0, "at both ends of the cavity's long side, along y")
-    base_thickness: float = quantity("mm", 2.0, "below the channel (one-sided)")
-    roof: float = quantity("mm", 1.0, "core above the channel, under the gaps")
-    channel_width: float = quantity("mm", 4.0, "air channel, y")
-    channel_height: float = quantity("mm", 2.0, "air channel, z")
+    angle: float = quantity(
+        "deg", note="between the chambers' long side and the x axis; 90 = across the beam", low=30, high=150
+    )
+    chambers: int = quantity(None, note="whole chambers (pairs, for a twisting segment)", low=1)
+    width: float = _size(12.0, "body width")
+    chamber_height: float = _size(4.0, "cavity, floor to ceiling")
+    cavity_thickness: float = _size(2.0, "cavity, normal")
+    wall: float = _size(1.0, "between cavity and gap, normal")
+    gap: float = _size(1.0, "between neighbouring chambers, normal")
+    top_wall: float = _size(1.0, "above the cavity")
+    side_wall: float = _size(1.0, "at both ends of the cavity's long side, along y")
+    base_thickness: float = _size(2.0, "below the channel (one-sided)")
+    roof: float = _size(1.0, "core above the channel, under the gaps")
+    channel_width: float = _size(4.0, "air channel, y")
+    channel_height: float = _size(2.0, "air channel, z")
     cavity_floor: float = quantity("mm", 1.0, "z of the cavity's floor; at most half the channel height")
-    end_margin: float = quantity("mm", 2.0, "bare core beyond the outermost corner of a chamber, each end")
+    end_margin: float = _size(2.0, "bare core beyond the outermost corner of a chamber, each end")
     layer_thickness: float = quantity(
         "mm", 0.0, "stiff layer at the bottom of the base (one-sided); 0 = none"
     )
     material: Hyperelastic = NeoHookean(mu=0.317)
     layer_material: Hyperelastic | None = None
 
-    def __post_init__(self):
-        if self.kind not in KINDS:
-            raise InputError(f"kind = '{self.kind}' is not known: write 'one-sided' or 'twisting'")
-        if not 30 <= self.angle <= 150:
-            raise InputError(f"angle_deg = {self.angle:g} is outside 30..150")
-        if self.chambers < 1:
-            raise InputError(f"chambers = {self.chambers}: a segment needs at least 1")
-        for name in (
-            "width",
-            "chamber_height",
-            "cavity_thickness",
-            "wall",
-            "gap",
-            "top_wall",
-            "side_wall",
-            "base_thickness",
-            "roof",
-            "channel_width",
-            "channel_height",
-            "end_margin",
-        ):
-            value = getattr(self, name)
-            if not value > 0:
-                raise InputError(f"{name}_mm = {value:g} must be larger than 0")
-            if not 0.05 <= value <= 500:
-                raise InputError(
-                    f"{name}_mm = {value:g} is not a castable size (0.05..500 mm): is it in metres?"
-                )
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._check_layer()
         if 2 * self.side_wall >= self.width:
             raise InputError(
@@ -133,92 +110,92 @@ class Segment:
             )
 
     @property
-    def key(self):
+    def key(self) -> "Segment":
         """Hashable identity of the cell: everything that the strains of the middle of a long segment depend
         on."""
         return replace(self, chambers=1, end_margin=1.0 + self.gap / self.sin / 2)
 
     @property
-    def mirrored(self):
+    def mirrored(self) -> "Segment":
         """The mirror image: 180 - angle, opposite handedness."""
         return replace(self, angle=180.0 - self.angle)
 
     @cached_property
-    def sin(self):
+    def sin(self) -> float:
         return float(np.sin(np.radians(self.angle)))
 
     @cached_property
-    def cot(self):
+    def cot(self) -> float:
         """cot(angle); 0 exactly at 90 degrees, odd about it."""
         return float(np.tan(np.radians(90.0 - self.angle)))
 
     @property
-    def chamber_thickness(self):
+    def chamber_thickness(self) -> float:
         """Outer thickness of a chamber, normal, mm."""
         return self.cavity_thickness + 2 * self.wall
 
     @property
-    def pitch(self):
+    def pitch(self) -> float:
         """Axial distance of neighbouring chambers, mm."""
         return (self.chamber_thickness + self.gap) / self.sin
 
     @property
-    def cavity_width(self):
+    def cavity_width(self) -> float:
         return self.width - 2 * self.side_wall
 
     @property
-    def core_top(self):
+    def core_top(self) -> float:
         return self.channel_height / 2 + self.roof
 
     @property
-    def core_bottom(self):
+    def core_bottom(self) -> float:
         return -self.core_top if self.kind == TWISTING else -self.channel_height / 2 - self.base_thickness
 
     @property
-    def layer_top(self):
+    def layer_top(self) -> float:
         """z (mm) up to which the bottom layer's material reaches; core_bottom when there is none."""
         return self.core_bottom + self.layer_thickness
 
     @property
-    def cavity_top(self):
+    def cavity_top(self) -> float:
         return self.cavity_floor + self.chamber_height
 
     @property
-    def chamber_top(self):
+    def chamber_top(self) -> float:
         return self.cavity_top + self.top_wall
 
     @property
-    def chamber_bottom(self):
+    def chamber_bottom(self) -> float:
         """Lowest point of the body, z in mm."""
         return -self.chamber_top if self.kind == TWISTING else self.core_bottom
 
     @property
-    def sides(self):
+    def sides(self) -> tuple[int, ...]:
         """+1 for the chambers above the core, -1 for the set turned by half a turn about x."""
         return (1, -1) if self.kind == TWISTING else (1,)
 
     @property
-    def end_length(self):
+    def end_length(self) -> float:
         """Passive length at each end, mm: wedge of the slanted chamber and the bare core beyond it."""
         return self.width / 2 * abs(self.cot) + self.end_margin
 
     @property
-    def end_wall(self):
+    def end_wall(self) -> float:
         """What closes the channel at a free end, mm: the channel runs half a gap beyond the outermost
         chamber."""
         return self.end_length - self.gap / self.sin / 2
 
     @property
-    def active_length(self):
+    def active_length(self) -> float:
         """(N-1) pitches and one chamber, mm."""
         return (self.chambers - 1) * self.pitch + self.chamber_thickness / self.sin
 
     @property
-    def length(self):
+    def length(self) -> float:
         return self.active_length + 2 * self.end_length
 
     @property
-    def chamber_positions(self):
+    def chamber_positions(self) -> np.ndarray:
         """Centres of the chambers on the axis, x in mm from the segment's start, shape (chambers,)."""
         first = self.end_length + self.chamber_thickness / self.sin / 2
         return first + self.pitch * np.arange(self.chambers)
@@ -228,9 +205,9 @@ class Segment:
 class Manipulator:
     """Segments in a row, joined on the channel axis, sharing one cavity."""
 
-    segments: tuple
+    segments: tuple[Segment, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "segments", tuple(self.segments))
         if not self.segments:
             raise InputError("segment: at least one [[segment]] is needed")
@@ -248,25 +225,25 @@ class Manipulator:
                 )
 
     @property
-    def length(self):
+    def length(self) -> float:
         return sum(s.length for s in self.segments)
 
     @property
-    def starts(self):
+    def starts(self) -> np.ndarray:
         """Undeformed arc length at which each segment begins, mm, shape (segments,)."""
         return np.concatenate([[0.0], np.cumsum([s.length for s in self.segments])[:-1]])
 
     @property
-    def materials(self):
+    def materials(self) -> tuple[Hyperelastic, ...]:
         """Every material of the body once, layers included."""
         return tuple(
             dict.fromkeys(m for s in self.segments for m in (s.material, s.layer_material) if m is not None)
         )
 
     @property
-    def chambers(self):
+    def chambers(self) -> int:
         return sum(s.chambers for s in self.segments)
 
     @property
-    def mirrored(self):
+    def mirrored(self) -> "Manipulator":
         return Manipulator(tuple(s.mirrored for s in self.segments))

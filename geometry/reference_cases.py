@@ -5,11 +5,12 @@ All dimensions in mm; "normal" thicknesses are across the chamber.
 """
 
 from functools import partial
+from typing import Any
 
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import Segment
 
-_W10 = dict(
+_W10: dict[str, Any] = dict(
     width=10.0,
     channel_width=2.0,
     channel_height=2.0,
@@ -18,7 +19,7 @@ _W10 = dict(
     gap=1.0,
     material=NeoHookean(mu=0.2068),
 )
-_TWIST_W12 = dict(
+_TWIST_W12: dict[str, Any] = dict(
     width=12.0,
     channel_width=4.0,
     channel_height=2.0,

@@ -1,11 +1,13 @@
 """A cell's shape without a length: what strains times a length depend on when the material has only one
 modulus."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
 
+from pneunet.base.materials.laws import Hyperelastic
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 
 #: Segment's attributes in order: the angle in degrees, then lengths
@@ -42,12 +44,12 @@ DIRECTIONS = {
 }
 
 
-def direction_matrix(kind):
+def direction_matrix(kind: str) -> np.ndarray:
     """(directions, 13) changes of the shape numbers along DIRECTIONS."""
     return np.array([[change.get(name, 0.0) for name in SHAPE] for change in DIRECTIONS[kind].values()])
 
 
-def changed(segment, change, step):
+def changed(segment: Segment, change: Mapping[str, float], step: float) -> Segment:
     """The Segment `step` along one of DIRECTIONS: degrees, or normal pitches."""
     length = normal_pitch(segment)
     return replace(
@@ -56,24 +58,24 @@ def changed(segment, change, step):
     )
 
 
-def normal_pitch(segment):
+def normal_pitch(segment: Segment) -> float:
     """Distance of neighbouring chambers across themselves, mm: the length by which all others are divided."""
     return segment.chamber_thickness + segment.gap
 
 
-def shape_numbers(segment):
+def shape_numbers(segment: Segment) -> np.ndarray:
     """(13,) the angle in degrees and the lengths of SHAPE in normal pitches."""
     return shapes_of([segment])[0][0]
 
 
-def shapes_of(segments):
+def shapes_of(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
     """(`shape_numbers` (n, 13), `normal_pitch` (n,) in mm) of n segments."""
     shape, pitch = np.array([_dimensions(s) for s in segments]), np.array([normal_pitch(s) for s in segments])
     shape[:, 1:] /= pitch[:, None]
     return shape, pitch
 
 
-def segment_of(kind, shape, pitch, material):
+def segment_of(kind: str, shape: np.ndarray, pitch: float, material: Hyperelastic) -> Segment:
     """The Segment of one chamber with these shape numbers (13,) and normal pitch (mm)."""
     lengths = dict(zip(SHAPE[1:], (shape[1:] * pitch).tolist()))
     return Segment(kind, float(shape[0]), 1, **lengths, end_margin=1.0 + pitch, material=material)

@@ -20,6 +20,19 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message} ({self.prog} --help tells more)")
 
 
+class _Version(argparse.Action):
+    """Name, version and revision, looked for when they are wanted."""
+
+    def __call__(self, parser, *_):
+        from importlib.metadata import version
+
+        from pneunet.base.files.record import revision
+
+        number, built = version("pneunet"), revision()
+        print(f"pneunet {number}" + (f" ({built})" if built != number else ""))
+        parser.exit()
+
+
 def pressures(text: str) -> list[float]:
     """kPa of a comma-separated list."""
     values = []
@@ -79,8 +92,8 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
         prog="pneunet",
         description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.",
     )
-    top.add_argument("--version", action="store_true", help="name, version and revision")
-    commands = top.add_subparsers(dest="command", metavar="COMMAND", parser_class=Parser)
+    top.add_argument("--version", action=_Version, nargs=0, help="name, version and revision")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
 
     def add(name, text):
         command = commands.add_parser(name, help=text, description=text)

@@ -7,37 +7,39 @@ error, under MPI from one rank); anything else is a bug and shows its traceback.
 import os
 import sys
 import time
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
 from pneunet.arguments import parser
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.system.launch import rank_map
+from pneunet.base.system.libraries import told_what_to_install
 from pneunet.base.system.log import is_rank_0, show_on_screen
 from pneunet.base.units import MPA_PER_KPA
 
 
-def design(a):
+def design(a: Namespace) -> None:
     from pneunet.design.inverse_design import run_design
     from pneunet.reduced.choice import choose_law
 
     run_design(a.target, a.output or Path("out") / a.target.stem, choose_law(a.law), outside=a.outside)
 
 
-def shape(a):
+def shape(a: Namespace) -> None:
     from pneunet.design.shape import run_shape
     from pneunet.reduced.choice import choose_law
 
     run_shape(a.design, a.pressures, a.output or a.design.parent, choose_law(a.law), a.outside)
 
 
-def mesh(a):
+def mesh(a: Namespace) -> None:
     from pneunet.geometry.cad.mesh import mesh_design
 
     mesh_design(a.design, a.output or a.design.parent, a.mesh_size_mm)
 
 
-def solve(a):
+def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
     content = read_design_file(a.design)  # before finite elements are loaded, which takes a while
@@ -48,32 +50,32 @@ def solve(a):
     solve_design(content, folder, a.mesh_size_mm, pressure, not a.no_fields, resume=a.resume)
 
 
-def cell(a):
+def cell(a: Namespace) -> None:
     from pneunet.hifi.runs.cell import run_cell
 
     run_cell(a.cell, a.output or a.cell.parent)
 
 
-def study(a):
+def study(a: Namespace) -> None:
     from pneunet.hifi.runs.study.study import run_study
 
     run_study(a.study, a.output or Path("out") / a.study.stem, retry=a.retry)
 
 
-def campaign(a):
+def campaign(a: Namespace) -> None:
     from pneunet.hifi.runs.campaign.campaign import run_campaign
 
     run_campaign(a.campaign, a.output or Path("out") / a.campaign.stem, retry=a.retry, extend=a.extend)
 
 
-def suggest(a):
+def suggest(a: Namespace) -> None:
     from pneunet.design.chain import suggest as suggestion
 
     found = suggestion(a.campaign, a.kind, a.number, a.of, a.touching, a.law)
     print(f"[further]\n{a.kind} = {found}")
 
 
-def train(a):
+def train(a: Namespace) -> None:
     from pneunet.reduced.training.train import run_training
 
     with rank_map() as mapping:
@@ -82,19 +84,19 @@ def train(a):
             run_training(a.data, out, not a.no_comparison, mapping, a.like)
 
 
-def report(a):
+def report(a: Namespace) -> None:
     from pneunet.front import report as write
 
     write(a.directory, a.law)
 
 
-def fit_material(a):
+def fit_material(a: Namespace) -> None:
     from pneunet.base.materials.fit_run import run_fit
 
     run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100)
 
 
-def run(a):
+def run(a: Namespace) -> int:
     from pneunet.base.system import launch
 
     if a.ranks < 1:
@@ -104,18 +106,10 @@ def run(a):
     return launch.run(a.ranks, a.rest)
 
 
-def doctor(a):
+def doctor(a: Namespace) -> int:
     from pneunet import doctor as check
 
     return check.main()
-
-
-def version() -> str:
-    """Name, version and revision."""
-    import pneunet
-    from pneunet.base.files.record import revision
-
-    return f"pneunet {pneunet.__version__} ({revision()})"
 
 
 COMMANDS = {
@@ -141,12 +135,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     grammar = parser(COMMANDS)
     try:
         a = grammar.parse_args(arguments)
-        if a.version:
-            print(version())
-            return 0
-        if a.command is None:
-            grammar.error("the following arguments are required: COMMAND")
-        return a.function(a) or 0
+        with told_what_to_install():
+            return a.function(a) or 0
     except (InputError, ConvergenceError, MemoryError) as error:
         # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with
         # it what rank 0 still has to say, at the first failure

@@ -73,9 +73,7 @@ def rod(
     """
     many = np.ndim(pressure_kPa) > 0
     pressure = [checked_kPa(p) * MPA_PER_KPA for p in np.atleast_1d(pressure_kPa)]
-    chosen = chosen_law(law)
-    laws = [chosen.of(each) for each in manipulator.segments]
-    return Rod.of(manipulator, laws, pressure if many else pressure[0], base_pose)
+    return Rod.of(manipulator, chosen_law(law), pressure if many else pressure[0], base_pose)
 
 
 def report(directory: str | Path, law: str | None = None) -> Path:

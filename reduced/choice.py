@@ -4,8 +4,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from pneunet.base.errors import InputError
-from pneunet.reduced.model import AnalyticModel
-from pneunet.reduced.trained.law import read_law
+from pneunet.reduced.analytic.law import AnalyticLaw
+from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.trained.file import read_law
+from pneunet.reduced.trained.law import TrainedLaw
 
 DATA = Path(__file__).resolve().parent / "data"
 #: how both are made: docs/rod-law.md
@@ -14,18 +16,18 @@ TRAINED, ANALYTIC = "trained", "analytic"
 
 
 @lru_cache
-def shipped_law():
-    """The trained RodLaw that comes along."""
+def shipped_law() -> TrainedLaw:
+    """The trained law that comes along."""
     return read_law(SHIPPED, TRAINED)
 
 
-def choose_law(name=TRAINED):
-    """The SegmentLaw called 'trained' or 'analytic', or the RodLaw in the file `name` (.npz); a law's own
-    `name` gives it again."""
+def choose_law(name: str = TRAINED) -> SegmentLaw:
+    """The law called 'trained' or 'analytic', or the trained one in the file `name` (.npz); a law's own
+    `name` gives it again. InputError for any other name, or where the file holds no law."""
     if name == TRAINED:
         return shipped_law()
     if name == ANALYTIC:
-        return AnalyticModel()
+        return AnalyticLaw()
     if Path(name).suffix != ".npz":
         raise InputError(f"--law {name}: write 'trained', 'analytic' or the .npz file of a trained law")
     return read_law(name)

@@ -49,7 +49,7 @@ def free_strains():
             law: choose_law(law).strains(segment, np.array(pressures) * 1e-3)
             for law in ("trained", "analytic")
         }
-        out[name] = {law: np.hstack([q.e, q.k]).tolist() for law, q in found.items()}
+        out[name] = {law: q.vector.tolist() for law, q in found.items()}
     return out
 
 
@@ -78,7 +78,7 @@ def cell():
         state, _ = solve_cell(
             CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1), Path(folder) / "cell.msh"
         )
-    strains = [*state.strains.e, *state.strains.k]
+    strains = state.strains.vector.tolist()
     return {"strains": strains, "volume_mm3": state.volume, "stiffness": state.stiffness.tolist()}
 
 

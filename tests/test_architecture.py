@@ -54,6 +54,7 @@ NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
 BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
+BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:
     def find_spec(self, name, path=None, target=None):
@@ -61,16 +62,19 @@ class Blocker:
             raise ImportError(f"{name} is blocked")
 
 sys.meta_path.insert(0, Blocker())
-names = ["pneunet.geometry.parameters", "pneunet.geometry.designfile", "pneunet.geometry.loading"]
-for package in ("pneunet.base", "pneunet.reduced", "pneunet.design"):
+import pneunet
+names = [m.name for m in pkgutil.iter_modules(pneunet.__path__, "pneunet.") if m.name != "pneunet.__main__"]
+for package in ("pneunet.base", "pneunet.geometry", "pneunet.reduced", "pneunet.design"):
     folder = importlib.import_module(package).__path__
     names += [package] + [m.name for m in pkgutil.walk_packages(folder, package + ".")]
+names = [name for name in set(names) if not name.startswith(("pneunet.geometry.cad.", "pneunet.hifi"))]
 public = 0
 for name in names:
     module = importlib.import_module(name)
     wanted = getattr(module, "__all__", [a for a in vars(module) if not a.startswith("_")])
     public += len([getattr(module, attribute) for attribute in wanted])
-assert not BLOCKED & set(sys.modules), BLOCKED & set(sys.modules)
+found = {name for name in BLOCKED if sys.modules.get(name)}
+assert not found, found
 print(len(names), public)
 """
 
@@ -135,7 +139,10 @@ def test_floors(package):
             if found and found[0] not in allowed:
                 wrong.append(f"{relative(path)}:{line}: {package} must not import {name}")
             top = name.split(".")[0]
-            if not found and at_import and top not in LIBRARIES[package] | sys.stdlib_module_names:
+            known = LIBRARIES[package] | sys.stdlib_module_names
+            if relative(path).startswith("hifi/verification/"):
+                known = known | {"gmsh"}  # its bodies are meshed here, not bodies that users build
+            if not found and at_import and top not in known:
                 wrong.append(f"{relative(path)}:{line}: {name} belongs inside a function")
     assert wrong == []
 

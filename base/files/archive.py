@@ -1,7 +1,9 @@
 """Arrays with a table about them in one .npz file of a named schema."""
 
 import json
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
@@ -9,7 +11,9 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
 
 
-def write_archive(path, schema, about, arrays, compress=False):
+def write_archive(
+    path: str | Path, schema: str, about: dict, arrays: Mapping[str, np.ndarray], compress: bool = False
+) -> None:
     """Write {name: array} to `path` with `about`, a table for JSON, of this schema."""
     table = np.frombuffer(json.dumps({"schema": schema, **about}).encode(), np.uint8)
     with atomic_path(path) as temporary:
@@ -18,7 +22,9 @@ def write_archive(path, schema, about, arrays, compress=False):
 
 
 @contextmanager
-def read_archive(path, schema, what, command):
+def read_archive(
+    path: str | Path, schema: str, what: str, command: str
+) -> Iterator[tuple[dict, Mapping[str, np.ndarray]]]:
     """Yields (about, stored arrays by name). InputError when the file is no `what`, as `command` makes it, of
     this schema."""
     try:

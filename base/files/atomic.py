@@ -4,6 +4,7 @@ import csv
 import io
 import os
 import tempfile
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from pneunet.base.errors import InputError
 
 
 @contextmanager
-def atomic_path(path):
+def atomic_path(path: str | Path) -> Iterator[Path]:
     """A temporary path beside `path` to write to; renamed onto it when the block ends without an
     exception."""
     path = Path(path)
@@ -28,12 +29,13 @@ def atomic_path(path):
         Path(temporary).unlink(missing_ok=True)
 
 
-def write_text(path, text):
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file, UTF-8 with plain line ends on every system."""
     with atomic_path(path) as temporary:
-        temporary.write_text(text)
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_csv(path, header, rows):
+def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Iterable]) -> None:
     """A CSV of numbers (and words), full precision to 12 digits."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -43,10 +45,10 @@ def write_csv(path, header, rows):
     write_text(path, out.getvalue())
 
 
-def read_csv(path):
+def read_csv(path: str | Path) -> tuple[list[str], list[list[str]]]:
     """(header, rows of text) of a CSV file; a missing file is an InputError."""
     try:
-        with open(path, newline="") as stream:
+        with open(path, newline="", encoding="utf-8") as stream:
             rows = [row for row in csv.reader(stream) if row and any(cell.strip() for cell in row)]
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
@@ -57,7 +59,7 @@ def read_csv(path):
     return rows[0], rows[1:]
 
 
-def read_columns(path, columns):
+def read_columns(path: str | Path, columns: Sequence[str]) -> np.ndarray:
     """Float array (n, len(columns)) of named columns of a CSV the project wrote itself."""
     header, rows = read_csv(path)
     missing = [c for c in columns if c not in header]
@@ -75,7 +77,7 @@ def read_columns(path, columns):
     return out
 
 
-def output_directory(path):
+def output_directory(path: str | Path) -> Path:
     """The folder, made if need be; an unwritable one is an InputError before any work is done."""
     path = Path(path)
     try:
@@ -89,7 +91,7 @@ def output_directory(path):
     return path
 
 
-def require_writable(path):
+def require_writable(path: str | Path) -> None:
     """InputError when `path` could not be made or written to; makes nothing itself, for use before long
     work."""
     existing = Path(path).absolute()

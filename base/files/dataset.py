@@ -10,7 +10,9 @@ Derivatives by the shape are along about['directions'], by kind: changes of the 
 pitches). One row a *case* (a design on a mesh) and one row a *state* (an equilibrium of a case).
 """
 
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +32,7 @@ SLOPE_BITS = 12
 FORBIDDEN = {"one-sided": [2, 5], "twisting": [1, 2, 4, 5]}
 
 
-def column(of, shape, kind, note):
+def column(of: str, shape: tuple[int, ...], kind: str, note: str) -> Any:
     """One array of the data set: rows are cases or states; further shape; numpy type on disk."""
     return field(metadata={"of": of, "shape": shape, "type": kind, "note": note})
 
@@ -96,17 +98,17 @@ class CellData:
             object.__setattr__(self, f.name, value)
 
     @property
-    def matrices(self):
+    def matrices(self) -> np.ndarray:
         """(m, 6, 6) stiffness."""
         return full_matrices(self.stiffness)
 
     @property
-    def overlapping(self):
+    def overlapping(self) -> np.ndarray:
         """(m,) bool: walls have passed through one another, without contact: no state of a real cell."""
         return (self.wall_distance < 0) & ~self.contact
 
     @property
-    def accepted(self):
+    def accepted(self) -> np.ndarray:
         """(n,) bool: the path came to its top pressure, stable all the way, and kept the symmetry of the
         body."""
         done = self.status == self.about["statuses"].index("done")
@@ -114,7 +116,7 @@ class CellData:
         return done & ~bad & (self.symmetry_defect <= self.about["largest_symmetry_defect"])
 
     @property
-    def symmetry_defect(self):
+    def symmetry_defect(self) -> np.ndarray:
         """(n,) norm of the strains that the body's half turns forbid over that of all (rest taken off), at
         the top pressure; nan: none.
 
@@ -126,10 +128,10 @@ class CellData:
         for row, where in last.items():
             q = self.strains[where] - np.eye(6)[0]
             forbidden = FORBIDDEN[self.about["kinds"][self.kind[row]]]
-            out[row] = np.linalg.norm(q[forbidden]) / max(np.linalg.norm(q), 1e-12)
+            out[row] = np.linalg.norm(q[forbidden]) / max(float(np.linalg.norm(q)), 1e-12)
         return out
 
-    def energy_defect(self):
+    def energy_defect(self) -> np.ndarray:
         """(n,) difference of stored energy and work of the pressure along the free states, over that work;
         nan: too few states.
 
@@ -149,19 +151,19 @@ class CellData:
         return out
 
 
-def full_matrices(upper):
+def full_matrices(upper: np.ndarray) -> np.ndarray:
     """(..., 6, 6) symmetric matrices of their upper triangles (..., 21)."""
     full = np.zeros((*upper.shape[:-1], 6, 6))
     full[..., UPPER[0], UPPER[1]] = full[..., UPPER[1], UPPER[0]] = upper
     return full
 
 
-def columns():
+def columns() -> list[Field]:
     """The dataclass fields of CellData that are arrays."""
     return [f for f in fields(CellData) if "of" in f.metadata]
 
 
-def write_dataset(path, data):
+def write_dataset(path: str | Path, data: CellData) -> None:
     """Write CellData to `path` (.npz); slopes are rounded to SLOPE_BITS."""
     arrays = {f.name: np.asarray(getattr(data, f.name)).astype(f.metadata["type"]) for f in columns()}
     arrays |= {
@@ -177,7 +179,7 @@ def _rounded(values, bits):
     return np.where(np.isfinite(values), kept.view(np.float32), values)
 
 
-def read_dataset(path):
+def read_dataset(path: str | Path) -> CellData:
     """The CellData in a file; InputError when it is none or of another version."""
     with read_archive(path, SCHEMA, "a data set of cells", "pneunet campaign") as (about, stored):
         return CellData(about, **{f.name: stored[f.name] for f in columns()})

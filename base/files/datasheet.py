@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pneunet.base.files.dataset import SCHEMA
+from pneunet.base.files.dataset import SCHEMA, CellData
 
 
-def datasheet(data):
+def datasheet(data: CellData) -> str:
     """Markdown text on CellData."""
     about = data.about
     lines = [

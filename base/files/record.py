@@ -6,32 +6,33 @@ import platform
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from pneunet.base.files.atomic import write_text
 
-
-def revision():
-    """Git revision of the source tree, with '-dirty' when it has local changes; 'unknown' outside a
-    checkout."""
-    root = Path(__file__).resolve().parent.parent
-    try:
-        out = subprocess.run(
-            ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"],
-            capture_output=True,
-            text=True,
-            timeout=10,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return "unknown"
-    return out.stdout.strip() if out.returncode == 0 else "unknown"
+#: folder that holds the packages of a checkout
+ROOT = Path(__file__).resolve().parents[2]
 
 
-def machine():
+def revision() -> str:
+    """Git revision of the checkout that this code runs from, with '-dirty' when it has local changes; the
+    package's version where the code is installed, whatever repository that is in."""
+    if (ROOT / ".git").exists() and (ROOT / "pyproject.toml").exists():
+        line = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=12"]
+        try:
+            return subprocess.run(line, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
+        except (OSError, subprocess.SubprocessError):
+            pass  # no git
+    return version("pneunet")
+
+
+def machine() -> dict:
     """Processor, cores, system and Python of this machine."""
     model = platform.processor()
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
         model = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     except (OSError, StopIteration):
         pass
@@ -43,7 +44,7 @@ def machine():
     }
 
 
-def write_record(directory, name="run.json", **entries):
+def write_record(directory: str | Path, name: str = "run.json", **entries: Any) -> dict:
     """Write run.json: command, time, revision, machine, and whatever the caller knows (inputs, versions,
     steps)."""
     record = {

@@ -1,35 +1,31 @@
 """Frozen dataclasses in and out of TOML, with the unit in every key.
 
-A field declared with `quantity("mm", 10.0)` is called `width` in Python (mm, MPa, degrees) and `width_mm` in
-files. Reading refuses unknown keys and wrong units in one line that names the key and the fix.
+A field declared with `base.quantities.quantity("mm", 10.0)` is called `width` in Python (mm, MPa, degrees)
+and `width_mm` in files. Reading refuses unknown keys, wrong units and values that are not allowed in one line
+that names the key and the fix.
 """
 
-import dataclasses
 import difflib
 import json
 import math
 import tomllib
+from collections.abc import Collection
+from dataclasses import MISSING, Field
 from pathlib import Path
+from typing import Any, TypeVar
 
-from pneunet.base.errors import InputError
+from pneunet.base.errors import InputError, located
+from pneunet.base.quantities import quantities, rounded
 from pneunet.base.units import TO_INTERNAL
 
-
-def quantity(unit, default=dataclasses.MISSING, note=""):
-    """A dataclass field that carries a unit (None for numbers without one) and a line of explanation."""
-    return dataclasses.field(default=default, metadata={"unit": unit, "note": note})
+Instance = TypeVar("Instance")
 
 
-def file_key(field):
-    unit = field.metadata.get("unit")
-    return f"{field.name}_{unit}" if unit else field.name
-
-
-def read_toml(path):
+def read_toml(path: str | Path) -> dict:
     """The tables of a TOML file; a missing or broken file is an InputError."""
     path = Path(path)
     try:
-        return tomllib.loads(path.read_text())
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except IsADirectoryError:
@@ -40,14 +36,14 @@ def read_toml(path):
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
 
 
-def as_table(value, where):
+def as_table(value: object, where: str) -> dict:
     """A copy of a TOML table; InputError when something else stands in its place."""
     if not isinstance(value, dict):
         raise InputError(f"{where}: must be a table of keys, not {value!r}")
     return dict(value)
 
 
-def refuse_unknown(table, known, where):
+def refuse_unknown(table: object, known: Collection[str], where: str) -> None:
     """InputError for the first key of `table` that is not in `known`, with the nearest known one."""
     for key in as_table(table, where):
         if key in known:
@@ -62,7 +58,7 @@ def refuse_unknown(table, known, where):
         raise InputError(f"{where}: unknown key '{key}': {hint}")
 
 
-def number(value, key, where, integer=False):
+def number(value: Any, key: str, where: str, integer: bool = False) -> Any:
     """A finite number, or an InputError naming the key."""
     wanted = int if integer else (int, float)
     if isinstance(value, bool) or not isinstance(value, wanted) or not math.isfinite(value):
@@ -71,65 +67,60 @@ def number(value, key, where, integer=False):
     return value
 
 
-def vector(value, key, where):
+def vector(value: object, key: str, where: str) -> tuple[float, ...]:
     """Three finite numbers as a tuple of floats, or an InputError naming the key."""
     if not isinstance(value, (list, tuple)) or len(value) != 3:
         raise InputError(f"{where}: '{key}' must be three numbers, [x, y, z], not {value!r}")
     return tuple(float(number(v, key, where)) for v in value)
 
 
-def from_table(cls, table, where, **preset):
-    """An instance of dataclass `cls` from a TOML table; fields without `unit` metadata come in by
-    `preset`."""
-    fields = {file_key(f): f for f in dataclasses.fields(cls) if "unit" in f.metadata}
+def from_table(cls: type[Instance], table: dict, where: str, **preset: Any) -> Instance:
+    """An instance of dataclass `cls` from a TOML table; fields that are no quantities come in by `preset`.
+
+    InputError for unknown, missing or wrong keys, and for values that `cls` refuses.
+    """
+    fields, values = quantities(cls), dict(preset)
     refuse_unknown(table, fields, where)
-    values = dict(preset)
     for key, field in fields.items():
-        if key not in table:
-            if field.default is dataclasses.MISSING:
-                raise InputError(
-                    f"{where}: key '{key}' is missing"
-                    + (f" ({field.metadata['note']})" if field.metadata["note"] else "")
-                )
-            continue
-        value = table[key]
-        if field.type in (float, "float"):
-            value = number(value, key, where) * TO_INTERNAL.get(field.metadata["unit"], 1.0)
-        elif field.type in (int, "int"):
-            value = number(value, key, where, integer=True)
-        elif field.type in (tuple, "tuple"):
-            value = tuple(v * TO_INTERNAL.get(field.metadata["unit"], 1.0) for v in vector(value, key, where))
-        elif field.type in (str, "str") and not isinstance(value, str):
-            raise InputError(f"{where}: '{key}' must be text in quotes, not {value!r}")
-        values[field.name] = value
-    try:
+        if key in table:
+            values[field.name] = _read(table[key], key, field, where)
+        elif field.default is MISSING:
+            note = f" ({field.metadata['note']})" if field.metadata["note"] else ""
+            raise InputError(f"{where}: key '{key}' is missing{note}")
+    with located(where):
         return cls(**values)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
-def to_table(instance):
-    """The TOML table of a dataclass instance: every field that carries a unit, in file units.
+def _read(value: object, key: str, field: Field, where: str) -> Any:
+    """The value of a key, checked by the type of its field and in inner units."""
+    factor = TO_INTERNAL.get(field.metadata["unit"], 1.0)
+    if field.type in (float, float | None):
+        return number(value, key, where) * factor
+    if field.type is int:
+        return number(value, key, where, integer=True)
+    if field.type is tuple:
+        return tuple(v * factor for v in vector(value, key, where))
+    for kind, words in ((bool, "true or false"), (str, "text in quotes")):
+        if field.type is kind and not isinstance(value, kind) and not field.metadata["allowed"]:
+            raise InputError(f"{where}: '{key}' must be {words}, not {value!r}")
+    return value
 
-    An infinite value means "none" or "not known" and is left out: the field's default brings it back.
+
+def to_table(instance: Any) -> dict:
+    """The TOML table of a dataclass instance: every quantity in file units.
+
+    None or an infinite value means "none" or "not known" and is left out: the field's default brings it back.
     """
     table = {}
-    for field in dataclasses.fields(instance):
-        if "unit" not in field.metadata:
-            continue
+    for key, field in quantities(type(instance)).items():
         value, factor = getattr(instance, field.name), TO_INTERNAL.get(field.metadata["unit"], 1.0)
         if isinstance(value, float):
-            if math.isinf(value):
-                continue
-            value = _rounded(value / factor)
+            value = None if math.isinf(value) else rounded(value / factor)
         elif isinstance(value, tuple):
-            value = [_rounded(v / factor) for v in value]
-        table[file_key(field)] = value
+            value = [rounded(v / factor) for v in value]
+        if value is not None:
+            table[key] = value
     return table
-
-
-def _rounded(value):
-    return float(f"{value:.12g}")
 
 
 def _value(value):
@@ -138,13 +129,10 @@ def _value(value):
     if isinstance(value, str):
         # JSON's escapes are TOML's too; JSON lets the delete character stand
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, (list, tuple)) or hasattr(value, "tolist"):
-        items = value.tolist() if hasattr(value, "tolist") else value
-        return (
-            "[" + ", ".join(_value(v) for v in items) + "]"
-            if isinstance(items, (list, tuple))
-            else _value(items)
-        )
+    if hasattr(value, "tolist"):  # numpy's
+        return _value(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, int):
@@ -152,12 +140,12 @@ def _value(value):
     raise TypeError(f"no TOML form for {value!r}")
 
 
-def toml_text(tables):
+def toml_text(tables: dict) -> str:
     """TOML text of nested dicts: plain values first, then [tables] and [[arrays of tables]]. Tested to read
     back."""
     lines = []
 
-    def write(table, path):
+    def write(table: dict, path: str) -> None:
         for key, value in table.items():
             if not isinstance(value, dict) and not _is_table_array(value):
                 lines.append(f"{key} = {_value(value)}")

@@ -1,23 +1,33 @@
 """`pneunet fit-material`: from a tensile test to a [material] table, a picture and a word on how far to trust
 it."""
 
+import logging
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError
+from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import atomic_path, output_directory, write_text
 from pneunet.base.files.toml import toml_text
-from pneunet.base.materials.fitting import TensileData, biaxial_spread, fit
+from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
-from pneunet.base.materials.laws import LAWS, material_to_table
-from pneunet.base.materials.tensile import read_tensile
+from pneunet.base.materials.laws import LAWS, Hyperelastic, material_to_table
+from pneunet.base.materials.tensile import Specimen, read_tensile
+
+log = logging.getLogger(__name__)
 
 #: laws that fit worse than this (relative) have no say in how uncertain the equibiaxial response is
 CREDIBLE = 0.1
 
 
-def run_fit(path, law="all", directory=None, stress_unit=None, largest_strain=np.inf, say=print):
+def run_fit(
+    path: str | Path,
+    law: str = "all",
+    directory: str | Path | None = None,
+    stress_unit: str | None = None,
+    largest_strain: float = np.inf,
+) -> Fit:
     """Fit `law` (a name of base.materials.laws.LAWS, any case, or "all") to the tests in `path`; returns the
     chosen Fit.
 
@@ -29,10 +39,8 @@ def run_fit(path, law="all", directory=None, stress_unit=None, largest_strain=np
     if law.lower() not in (*names, "all"):
         raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
     specimens = read_tensile(path, stress_unit)
-    try:
+    with located(path):
         tests = TensileData(specimens, largest_strain)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     directory = output_directory(directory or Path("out") / f"fit-{path.stem}")
     elongation = min(float(s.stretch[-1]) for s in specimens) - 1
     common = {
@@ -55,45 +63,53 @@ def run_fit(path, law="all", directory=None, stress_unit=None, largest_strain=np
     shown = list(fits.values()) if law.lower() == "all" else [chosen]
     draw(directory / "fit.png", path.stem, specimens, tests, shown, chosen, credible)
     count = f"{len(specimens)} specimen{'s' * (len(specimens) > 1)}"
-    say(
+    log.info(
         f"{path.name}: {count}, fitted to stretch {tests.largest:.2f}, break at {100 * elongation:.0f} %"
         " strain"
     )
     for f in shown:
-        say(
+        log.info(
             f"{'-> ' if f is chosen else '   '}{f.material.law:14s} error {100 * f.error:5.1f} %  "
             f" {parameters(f.material)}"
         )
     for warning in chosen.warnings:
-        say(f"warning: {warning}")
+        log.warning(f"warning: {warning}")
     if not any(s.broke for s in specimens):
-        say(
+        log.warning(
             "warning: no fall of the stress is seen: if the test stopped before break, take"
             " elongation_at_break_percent out"
         )
-    say(
+    log.warning(
         f"warning: uniaxial data alone: at equibiaxial stretch {stretch:.2g} the {len(credible)} laws that"
         f" fit predict {low:.4g}..{high:.4g} MPa"
     )
-    say(f"written: {directory / 'material.toml'}, fit.png")
+    log.info(f"written: {directory / 'material.toml'}, fit.png")
     return chosen
 
 
-def best(fits):
+def best(fits: Collection[Fit]) -> Fit:
     """Least error among fits that are stable and likely in equibiaxial tension; among all if there is
     none."""
     stable = [f for f in fits if not any(w.startswith(("unstable", "unlikely")) for w in f.warnings)]
     return min(stable or fits, key=lambda f: f.error)
 
 
-def parameters(material):
+def parameters(material: Hyperelastic) -> str:
     """The law's own parameters in file units, in one line."""
     table = material_to_table(material)
     own = list(table.items())[1 : 1 + len(material.parameters)]
     return ", ".join(f"{key} = {value:.4g}" for key, value in own if value)
 
 
-def draw(path, title, specimens, tests, shown, chosen, credible):
+def draw(
+    path: Path,
+    title: str,
+    specimens: list[Specimen],
+    tests: TensileData,
+    shown: list[Fit],
+    chosen: Fit,
+    credible: list[Fit],
+) -> None:
     """Data and fits, residuals, and what the laws say of equibiaxial tension; nominal stress against
     stretch."""
     import matplotlib
@@ -113,7 +129,7 @@ def draw(path, title, specimens, tests, shown, chosen, credible):
         fitted.plot(s.stretch[near], s.stress[near], ".", color="0.6", markersize=3)
     fitted.plot([], [], ".", color="0.6", label="test")
 
-    def style(f):
+    def style(f: Fit) -> dict:
         i = list(LAWS).index(f.material.law)
         # dashed in turn: a law may hide another that it contains
         return {

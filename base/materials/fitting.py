@@ -1,20 +1,22 @@
 """Fit a law to uniaxial tests, and say how far the fit is to be trusted.
 
-Nominal stress is linear in a law's moduli once jm (Gent) or the exponents (Ogden) are fixed, so the moduli
-are found by linear least squares with lower bounds of zero (which keep every law but Yeoh's stable), and the
-rest by a search around them.
+Nominal stress is linear in a law's moduli (parameters in MPa) once jm (Gent) or the exponents (Ogden) are
+fixed, so the moduli are found by linear least squares with lower bounds of zero (which keep every law but
+Yeoh's stable), and the rest by a search around them.
 """
 
-from dataclasses import dataclass
-from itertools import combinations
-from types import SimpleNamespace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize, nnls
 
 from pneunet.base.errors import InputError
-from pneunet.base.materials.hyperelastic import MODES, nominal_stress, stable_stretch
-from pneunet.base.materials.laws import LAWS, Ogden
+from pneunet.base.materials.hyperelastic import MODES, Energy, nominal_stress, stable_stretch
+from pneunet.base.materials.laws import LAWS, Hyperelastic, Ogden, unchecked
+from pneunet.base.materials.tensile import Specimen
 
 #: Ogden's exponents: bounds, and where to start. Below -2 (Mooney-Rivlin's second term) the uniaxial curve
 #: hardly sees the exponent, while the equibiaxial stress grows as l^(-2 alpha): fits there predicted it wrong
@@ -24,8 +26,6 @@ EXPONENTS = (-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0
 #: equibiaxial over uniaxial nominal stress at the same stretch, up to 2: neo-Hookean 1.1, measured on rubbers
 #: up to about 2
 LARGEST_RATIO = 2.5
-#: largest jm: beyond it Gent's law is the neo-Hookean one
-LARGEST_JM = 1e5
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,15 @@ class Fit:
     """material: the law with its parameters; error: root mean square of the stress error over that of the
     stress; warnings: why not to trust it, each one line."""
 
-    material: object
+    material: Hyperelastic
     error: float
-    warnings: tuple
+    warnings: tuple[str, ...]
 
 
 class TensileData:
     """What is fitted: all points of all specimens, thinned to at most 200 a specimen and weighted equally."""
 
-    def __init__(self, specimens, largest_strain=np.inf):
+    def __init__(self, specimens: Iterable[Specimen], largest_strain: float = np.inf):
         stretch, stress, weight = [], [], []
         for s in specimens:
             use = np.flatnonzero(s.stretch - 1 <= largest_strain)
@@ -59,22 +59,22 @@ class TensileData:
         self.largest = float(self.stretch.max())
         self.size = float(np.linalg.norm(self.weight * self.stress))
 
-    def error(self, material):
+    def error(self, material: Energy) -> float:
         """Relative root mean square error of the nominal stress."""
         return float(
             np.linalg.norm(self.weight * (nominal_stress(material, "uniaxial", self.stretch) - self.stress))
             / self.size
         )
 
-    def moduli(self, law, names, free=(), **fixed):
-        """({name: MPa}, relative error) of the best moduli >= 0 (any sign for those in `free`), the rest
-        `fixed`."""
-        signs = [(name, 1.0) for name in names] + [(name, -1.0) for name in free]
+    def moduli(
+        self, law: type[Hyperelastic], names: Sequence[str], **fixed: float
+    ) -> tuple[dict[str, float], float]:
+        """({name: MPa}, relative error) of the best moduli >= 0 (any sign for those that the law says are
+        `signed`), the rest `fixed`."""
+        signs = [(name, 1.0) for name in names] + [(name, -1.0) for name in law.signed]
         columns = []
         for name, sign in signs:
-            unit = SimpleNamespace(law=law, **{n: sign * (n == name) for n in names}, **fixed)
-            if law == Ogden.law:
-                unit.terms = ((1.0, fixed["alpha" + name[2:]]),)
+            unit = unchecked(law, **{n: sign * (n == name) for n in names}, **fixed)
             columns.append(self.weight * nominal_stress(unit, "uniaxial", self.stretch))
         scale = np.linalg.norm(columns, axis=1)
         values, residual = nnls((np.array(columns) / scale[:, None]).T, self.weight * self.stress)
@@ -85,21 +85,31 @@ class TensileData:
         return found, residual / self.size
 
 
-def _gent(tests):
-    lowest = 1.001 * (tests.largest**2 + 2 / tests.largest - 3)
+def _moduli(law):
+    """Names of the parameters in which its stress is linear."""
+    return [f.name for f in fields(law) if f.name in law.parameters and f.metadata["unit"] == "MPa"]
 
-    def parameters(jm):
-        return tests.moduli("Gent", ("mu",), jm=jm)
 
-    grid = lowest * np.geomspace(1, LARGEST_JM / lowest, 60)
-    start = np.log(grid[np.argmin([parameters(jm)[1] for jm in grid])])
-    x = minimize(
-        lambda x: parameters(np.exp(np.clip(x[0], np.log(lowest), np.log(LARGEST_JM))))[1],
-        [start],
-        method="Nelder-Mead",
-    ).x
-    jm = float(np.exp(np.clip(x[0], np.log(lowest), np.log(LARGEST_JM))))
-    return parameters(jm)[0] | {"jm": jm}
+def _ranges(law, tests):
+    """{name: (low, high)} of its other parameters."""
+    others = [name for name in law.parameters if name not in _moduli(law)]
+    return {name: law.fit_range(name, tests.largest) for name in others}
+
+
+def _searched(law, tests):
+    """Moduli at the best of the other parameters, on a logarithmic scale."""
+    ranges, names = _ranges(law, tests), _moduli(law)
+    low, high = np.log(np.reshape([*ranges.values()], (-1, 2))).T
+
+    def solve(x):
+        others = dict(zip(ranges, np.exp(np.clip(x, low, high)).tolist()))
+        moduli, error = tests.moduli(law, names, **others)
+        return moduli | others, error
+
+    x = min(product(*np.linspace(low, high, 60).T), key=lambda x: solve(x)[1])
+    if ranges:
+        x = minimize(lambda x: solve(x)[1], x, method="Nelder-Mead").x
+    return solve(x)[0]
 
 
 def _ogden(tests):
@@ -110,7 +120,7 @@ def _ogden(tests):
         a = np.where(np.abs(a) < 0.01, 0.01, a)
         names = [f"mu{p}" for p in range(1, len(a) + 1)]
         alphas = {f"alpha{p}": float(x) for p, x in enumerate(a, start=1)}
-        moduli, error = tests.moduli("Ogden", names, **alphas)
+        moduli, error = tests.moduli(Ogden, names, **alphas)
         return moduli | alphas, error
 
     best = []
@@ -125,20 +135,13 @@ def _ogden(tests):
     return next(parameters for parameters, error in best if error <= enough)
 
 
-SEARCHES = {
-    "neo-Hookean": lambda t: t.moduli("neo-Hookean", ("mu",))[0],
-    "Mooney-Rivlin": lambda t: t.moduli("Mooney-Rivlin", ("c10", "c01"))[0],
-    "Yeoh": lambda t: t.moduli("Yeoh", ("c10", "c20", "c30"), free=("c20",))[0],
-    "Gent": _gent,
-    "Ogden": _ogden,
-}
-
-
-def fit(law, tests, **common):
+def fit(law: str, tests: TensileData, **common: Any) -> Fit:
     """The Fit of one law to `TensileData`; `common`: density, name and the like. InputError when no usable
     law comes out."""
-    parameters = {name: float(f"{value:.6g}") for name, value in SEARCHES[law](tests).items()}
-    material = LAWS[law](**parameters, **common)
+    cls = LAWS[law]
+    found = _ogden(tests) if cls is Ogden else _searched(cls, tests)
+    rounded: dict[str, Any] = {name: float(f"{value:.6g}") for name, value in found.items()}
+    material = cls(**rounded, **common)
     return Fit(material, tests.error(material), tuple(_warnings(material, tests)))
 
 
@@ -163,14 +166,17 @@ def _warnings(material, tests):
                 f" {abs(100 * (told / measured - 1)):.0f} % too {'stiff' if told > measured else 'soft'},"
                 " where a robot mostly works: fit to less strain"
             )
+    law = type(material)
     for name in material.parameters:
         value = getattr(material, name)
-        if (name.startswith("c") or name == "mu") and value == 0 and (name != "c20"):
-            yield f"{name} came out at its bound 0: the test does not ask for it"
-        if name == "jm" and value > 0.9 * LARGEST_JM:
-            yield "jm came out at its bound: the test shows no stiffening, take the neo-Hookean law"
-        if name.startswith("alpha") and value and not LOWEST_EXPONENT < value < HIGHEST_EXPONENT:
-            yield f"{name} = {value:g} came out at its bound"
+        if law is Ogden:
+            if name.startswith("alpha") and value and not LOWEST_EXPONENT < value < HIGHEST_EXPONENT:
+                yield f"{name} = {value:g} came out at its bound"
+        elif name in _moduli(law):
+            if value == 0 and name not in law.signed:
+                yield f"{name} came out at its bound 0: the test does not ask for it"
+        elif value > 0.9 * law.fit_range(name, reach)[1]:
+            yield f"{name} came out at its bound: the test shows no stiffening, take the neo-Hookean law"
     stretch = min(2.0, reach)
     ratio = nominal_stress(material, "equibiaxial", stretch) / nominal_stress(material, "uniaxial", stretch)
     if not ratio < LARGEST_RATIO:
@@ -189,7 +195,7 @@ def _warnings(material, tests):
             yield f"unstable in {mode} from stretch {limit:.3g} on, {where}"
 
 
-def biaxial_spread(fits, stretch):
+def biaxial_spread(fits: Iterable[Fit], stretch: float) -> tuple[float, float]:
     """(lowest, highest) equibiaxial nominal stress (MPa) that the fitted laws predict at this stretch."""
     values = [float(nominal_stress(f.material, "equibiaxial", stretch)) for f in fits]
     known = [v for v in values if np.isfinite(v)]

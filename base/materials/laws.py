@@ -1,43 +1,102 @@
-"""Material parameters: what a silicone is, apart from how a solver uses it.
+"""Laws of materials: what a silicone is, apart from how a solver uses it.
 
 Each law is an energy density W (MPa) of the isochoric deformation, with I1 and I2 the invariants of C /
-det(C)^(1/3) and l1, l2, l3 its principal stretches. Incompressible unless a bulk modulus is given.
+det(C)^(1/3) and l1, l2, l3 its principal stretches. Incompressible unless a bulk modulus is given. The energy
+is written once, in operators that take arrays as well as the symbols of finite elements: a new law is a class
+here and a name in LAWS.
 """
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, file_key, from_table, quantity, to_table
+import numpy as np
+
+from pneunet.base.errors import InputError, located
+from pneunet.base.files.toml import as_table, from_table, to_table
+from pneunet.base.materials import halfpowers
 from pneunet.base.materials.hyperelastic import MODES, stable_stretch
 from pneunet.base.materials.silicones import bulletin
+from pneunet.base.quantities import Checked, quantities, quantity
 
 #: a law that is not stable up to this stretch has a slip in its numbers
 STABLE_AT_LEAST = 1.2
 
+Law = TypeVar("Law")
+
+
+def unchecked(law: type[Law], **parameters: Any) -> Law:
+    """A law with these parameters, arrays or symbols among them: nothing is checked."""
+    made = object.__new__(law)
+    vars(made).update(parameters)
+    return made
+
+
+class Arrays:
+    """Operators on complex arrays that continue the real functions: nan where these have no value."""
+
+    @staticmethod
+    def ln(x: np.ndarray) -> np.ndarray:
+        return np.log(np.where(x.real > 0, x, np.nan))
+
+    @staticmethod
+    def sqrt(x: np.ndarray) -> np.ndarray:
+        return np.sqrt(np.where(x.real >= 0, x, np.nan))
+
+    exp = staticmethod(np.exp)
+
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperelastic:
+class Hyperelastic(Checked):
     """What every law has beside its own parameters; those come first, in order of the law's formula.
+
+    A law says its `energy`, `law`, its name in files, `stiffness`, its shear modulus in words, and `mu`, that
+    modulus in MPa. What else it may say: `signed`, moduli that may be negative; `constants`, what its energy
+    takes in finite elements where these are not its own parameters; `long`, an energy whose derivatives take
+    the form compiler minutes.
 
     density in tonne/mm^3 (file key: kg/m^3); bulk_modulus in MPa, inf = incompressible; elongation_at_break:
     engineering strain, inf = not known. Infinite values are not written to files.
     """
 
-    density: float = quantity("kg_per_m3", 1.07e-9, note="mass density")
+    density: float = quantity("kg_per_m3", 1.07e-9, "mass density", low=0, high=1e5)
     bulk_modulus: float = quantity("MPa", math.inf, note="incompressible unless given")
-    elongation_at_break: float = quantity("percent", math.inf, note="engineering strain at break")
-    name: str = field(default="silicone", metadata={"unit": None, "note": "free text"})
-    source: str = field(default="", metadata={"unit": None, "note": "where the numbers come from"})
+    elongation_at_break: float = quantity("percent", math.inf, "engineering strain at break", above=0)
+    name: str = quantity(None, "silicone", "free text")
+    source: str = quantity(None, "", "where the numbers come from")
 
-    def __post_init__(self):
-        if not 0 <= self.density < 1e-7:
-            raise InputError(f"density_kg_per_m3 = {self.density * 1e12:g} is outside 0..1e5")
-        if not self.elongation_at_break > 0:
-            raise InputError(
-                f"elongation_at_break_percent = {self.elongation_at_break * 100:g} must be larger than 0"
-            )
+    law: ClassVar[str]
+    stiffness: ClassVar[str]
+    parameters: ClassVar[tuple[str, ...]]
+    constants: ClassVar[tuple[str, ...]]
+    signed: ClassVar[tuple[str, ...]] = ()
+    long: ClassVar[bool] = False
+
+    if TYPE_CHECKING:
+
+        @property
+        def mu(self) -> float:
+            """Shear modulus at rest, MPa."""
+
+    def energy(self, I1: Any, I2: Any, operators: Any) -> Any:
+        """W (MPa) of the invariants: arrays with the operators ln, sqrt and exp of `Arrays`, or UFL's symbols
+        with those of ufl, the parameters being symbols too."""
+        raise NotImplementedError
+
+    def of_stretches(self, stretches: np.ndarray) -> np.ndarray:
+        """W (...,) in MPa of principal stretches (..., 3) whose product is 1, real or complex."""
+        squares = stretches * stretches
+        return self.energy(squares.sum(-1), (1 / squares).sum(-1), Arrays)
+
+    @classmethod
+    def fit_range(cls, name: str, largest: float) -> tuple[float, float]:
+        """(low, high), positive, between which a parameter that is no modulus is fitted to tests that reach
+        the stretch `largest`."""
+        raise NotImplementedError
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._check_law()
         if not 1e-4 <= self.mu <= 1e3:
             raise InputError(
@@ -62,20 +121,21 @@ class Hyperelastic:
                     f" {mode}: check signs"
                 )
 
-    def __init_subclass__(cls):
+    def __init_subclass__(cls) -> None:
         #: names of the law's own parameters, in order
-        cls.parameters = tuple(name for name in cls.__annotations__)
+        cls.parameters = tuple(cls.__annotations__)
+        cls.constants = vars(cls).get("constants", cls.parameters)
 
-    def _check_law(self):
+    def _check_law(self) -> None:
         """InputError for parameters that this law cannot have."""
 
     @property
-    def bulk_compliance(self):
+    def bulk_compliance(self) -> float:
         """1 / bulk modulus, 1/MPa; 0 when incompressible."""
         return 1 / self.bulk_modulus
 
     @property
-    def break_stretch(self):
+    def break_stretch(self) -> float:
         """Stretch at which a strip breaks; inf when not known."""
         return 1 + self.elongation_at_break
 
@@ -88,6 +148,9 @@ class NeoHookean(Hyperelastic):
     law = "neo-Hookean"
     stiffness = "mu_MPa"
 
+    def energy(self, I1: Any, I2: Any, operators: Any) -> Any:
+        return self.mu / 2 * (I1 - 3)
+
 
 @dataclass(frozen=True)
 class MooneyRivlin(Hyperelastic):
@@ -99,8 +162,11 @@ class MooneyRivlin(Hyperelastic):
     stiffness = "2 (c10_MPa + c01_MPa)"
 
     @property
-    def mu(self):
+    def mu(self) -> float:
         return 2 * (self.c10 + self.c01)
+
+    def energy(self, I1: Any, I2: Any, operators: Any) -> Any:
+        return self.c10 * (I1 - 3) + self.c01 * (I2 - 3)
 
 
 @dataclass(frozen=True)
@@ -112,10 +178,15 @@ class Yeoh(Hyperelastic):
     c30: float = quantity("MPa", 0.0)
     law = "Yeoh"
     stiffness = "2 c10_MPa"
+    signed = ("c20",)
 
     @property
-    def mu(self):
+    def mu(self) -> float:
         return 2 * self.c10
+
+    def energy(self, I1: Any, I2: Any, operators: Any) -> Any:
+        x = I1 - 3
+        return self.c10 * x + self.c20 * x**2 + self.c30 * x**3
 
 
 @dataclass(frozen=True)
@@ -123,16 +194,31 @@ class Gent(Hyperelastic):
     """W = -mu jm/2 ln(1 - (I1 - 3)/jm): no state with I1 >= 3 + jm exists."""
 
     mu: float = quantity("MPa", note="shear modulus")
-    jm: float = quantity(None, note="largest I1 - 3")
+    jm: float = quantity(
+        None,
+        note="largest I1 - 3",
+        low=0.1,
+        high=1e6,
+        hint="it is the largest I1 - 3 (some 10 to 100 for silicones)",
+    )
     law = "Gent"
     stiffness = "mu_MPa"
 
-    def _check_law(self):
-        if not 0.1 <= self.jm <= 1e6:
-            raise InputError(
-                f"jm = {self.jm:g} must lie in 0.1..1e6: it is the largest I1 - 3 (some 10 to 100 for"
-                " silicones)"
-            )
+    def energy(self, I1: Any, I2: Any, operators: Any) -> Any:
+        """With the root of 1 - x, x = (I1 - 3)/jm.
+
+        The logarithm is gone from its derivative, and 1/(1 - x) beyond the limit x = 1 is a finite stress of
+        wrong sign on which Newton's method could settle. The root makes stress and tangent nan there, so that
+        a step which leaves the admissible range is recognised and cut back, and every accepted state is
+        Gent's.
+        """
+        x = (I1 - 3) / self.jm
+        return -self.mu * self.jm * operators.ln(operators.sqrt(1 - x))
+
+    @classmethod
+    def fit_range(cls, name: str, largest: float) -> tuple[float, float]:
+        """Beyond the upper end it is the neo-Hookean law."""
+        return 1.001 * (largest**2 + 2 / largest - 3), 1e5
 
 
 @dataclass(frozen=True)
@@ -151,14 +237,24 @@ class Ogden(Hyperelastic):
     alpha3: float = quantity(None, 0.0)
     law = "Ogden"
     stiffness = "mu1_MPa + mu2_MPa + mu3_MPa"
+    constants = ("half_power_weights",)
+    long = True
     largest_exponent = 10.0
 
+    def energy(self, I1: Any, I2: Any, operators: Any) -> Any:
+        """By a series (base.materials.halfpowers), since principal stretches cannot be differentiated where
+        they coincide."""
+        return halfpowers.energy(self.half_power_weights, I1, I2, operators)
+
+    def of_stretches(self, stretches: np.ndarray) -> np.ndarray:
+        return sum(2 * m / a**2 * (stretches**a - 1).sum(-1) for m, a in self.terms)
+
     @property
-    def mu(self):
+    def mu(self) -> float:
         return self.mu1 + self.mu2 + self.mu3
 
     @cached_property
-    def terms(self):
+    def terms(self) -> tuple[tuple[float, float], ...]:
         """((mu_p, alpha_p), ...) of the terms in use."""
         return tuple(
             (m, a)
@@ -167,11 +263,9 @@ class Ogden(Hyperelastic):
         )
 
     @cached_property
-    def half_power_weights(self):
-        """What finite elements take instead: see base.materials.halfpowers."""
-        from pneunet.base.materials.halfpowers import weights
-
-        return weights(self.terms)
+    def half_power_weights(self) -> np.ndarray:
+        """(2 ORDER,) MPa: what finite elements take instead of the terms."""
+        return halfpowers.weights(self.terms)
 
     def _check_law(self):
         for p, (m, a) in enumerate(
@@ -191,15 +285,15 @@ PAPER_HELICAL = NeoHookean(
     mu=0.619 / (2 * 1.49), name="paper, helical theory", source="Jiang et al. 2021, Sec. IV, E=0.619, nu=0.49"
 )
 
-LAWS = {cls.law: cls for cls in (NeoHookean, MooneyRivlin, Yeoh, Gent, Ogden)}
+LAWS: dict[str, type[Hyperelastic]] = {cls.law: cls for cls in (NeoHookean, MooneyRivlin, Yeoh, Gent, Ogden)}
 
 
-def silicone(name):
+def silicone(name: str) -> NeoHookean:
     """NeoHookean of the table in base.materials.silicones; InputError for another name."""
     return from_table(NeoHookean, bulletin(name), "silicone")
 
 
-def material_from_table(table, where):
+def material_from_table(table: dict, where: str) -> Hyperelastic:
     """A law from its TOML table: `law = "..."` (default neo-Hookean) with its parameters, or `silicone =
     "..."`, a row of the table in base.materials.silicones, of which further keys replace values."""
     table = as_table(table, where)
@@ -208,18 +302,16 @@ def material_from_table(table, where):
             raise InputError(
                 f"{where}: 'silicone' and 'law' exclude each other: the table of silicones is neo-Hookean"
             )
-        try:
+        with located(where):
             table = {**bulletin(table.pop("silicone")), **table}
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
     law = table.pop("law", NeoHookean.law)
     if law not in tuple(LAWS):
         raise InputError(f"{where}: unknown law '{law}': known laws are {', '.join(LAWS)}")
     return from_table(LAWS[law], table, where)
 
 
-def material_to_table(material):
+def material_to_table(material: Hyperelastic) -> dict:
     """The TOML table that material_from_table reads, the law's own parameters first."""
     table = to_table(material)
-    own = {file_key(f): table.pop(file_key(f)) for f in fields(material) if f.name in material.parameters}
+    own = {k: table.pop(k) for k, f in quantities(type(material)).items() if f.name in material.parameters}
     return {"law": material.law, **own, **table}

@@ -26,7 +26,7 @@ BULLETINS = {
 }
 
 
-def bulletin(name):
+def bulletin(name: str) -> dict:
     """File keys of a neo-Hookean material for a silicone of the table; InputError for another name.
 
     A bulletin's "100 % modulus" is the nominal stress at twice the length, for a neo-Hookean solid mu (2 -

@@ -9,6 +9,7 @@ each starting again from small strain.
 import csv
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class Specimen:
     broke: bool
 
 
-def read_tensile(path, stress_unit=None):
+def read_tensile(path: str | Path, stress_unit: str | None = None) -> list[Specimen]:
     """List of Specimen; stress_unit ("kPa", ...) serves where the header names none. InputError for anything
     unclear."""
     rows = _rows(path)

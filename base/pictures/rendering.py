@@ -4,7 +4,10 @@ bar.
 pyvista and matplotlib are imported inside the functions: without them everything else works.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +16,7 @@ from pneunet.base.files.atomic import atomic_path
 PIXELS = (900, 720)
 
 
-def camera_angles(points):
+def camera_angles(points: np.ndarray) -> tuple[float, float]:
     """(elevation, azimuth) in degrees from which a curve (n, 3) with z up is seen well: 25 degrees above, and
     across its longest horizontal direction, turned by 30 degrees so that depth shows."""
     flat = np.asarray(points)[:, :2] - np.mean(np.asarray(points)[:, :2], axis=0)
@@ -22,14 +25,15 @@ def camera_angles(points):
     return 25.0, float(np.degrees(np.arctan2(along[1], along[0]))) - 90.0 + 30.0
 
 
-def figure(width, height):
+def figure(width: float, height: float) -> Any:
     """A matplotlib Figure (inches) with the Agg canvas: no window, no global state."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), facecolor="white")
 
 
-def save(figure, path, dpi=120):
+def save(figure: Any, path: str | Path, dpi: float = 120) -> None:
+    """Write a matplotlib Figure; the format follows from the path."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=dpi)
 
@@ -45,11 +49,11 @@ class View:
     half_height: float
 
     @property
-    def millimetres_per_pixel(self):
+    def millimetres_per_pixel(self) -> float:
         return 2 * self.half_height / PIXELS[1]
 
 
-def view_of(points, margin=1.12):
+def view_of(points: np.ndarray, margin: float = 1.12) -> View:
     """The View that holds all points (n, 3), seen from `camera_angles`."""
     points = np.asarray(points, float)
     elevation, azimuth = np.radians(camera_angles(points))
@@ -65,14 +69,14 @@ def view_of(points, margin=1.12):
     return View(focus, right, up, margin * max(half[1], half[0] * PIXELS[1] / PIXELS[0]))
 
 
-def render(view, things, pixels=PIXELS):
+def render(view: View, things: Iterable[tuple[Any, dict]], pixels: tuple[int, int] = PIXELS) -> np.ndarray:
     """Image (height, width, 3) of [(pyvista mesh, keywords of Plotter.add_mesh)]."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
     # without X, VTK tries it first and warns before it falls back to EGL or OSMesa
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(pixels))
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=list(pixels))
     plotter.set_background("white")
     towards = np.cross(view.right, view.up)
     for mesh, keywords in things:
@@ -92,18 +96,25 @@ def render(view, things, pixels=PIXELS):
     return np.asarray(image)[..., :3]
 
 
-def edges(mesh, angle=35):
+def edges(mesh: Any, angle: float = 35) -> tuple[Any, dict]:
     """Sharp edges and rims of a surface as thin dark lines."""
     found = mesh.extract_feature_edges(feature_angle=angle, boundary_edges=True, non_manifold_edges=False)
     return found, {"color": "#3b434b", "line_width": 1.5, "lighting": False}
 
 
-def coloured(surface, name, limits, cmap):
+def coloured(surface: Any, name: str, limits: tuple[float, float], cmap: str) -> tuple[Any, dict]:
     """A surface coloured by point data."""
     return surface, {"scalars": name, "clim": limits, "cmap": cmap}
 
 
-def write_picture(path, view, image, title, bar=None, extend="neither"):
+def write_picture(
+    path: str | Path,
+    view: View,
+    image: np.ndarray,
+    title: str,
+    bar: tuple[str, tuple[float, float], str] | None = None,
+    extend: str = "neither",
+) -> None:
     """PNG of a rendered image with a title, a scale in mm, the directions of the axes and, when `bar` =
     (label, limits, cmap) is given, a colour bar; extend: as matplotlib's, the ends beyond which there are
     values."""
@@ -126,7 +137,7 @@ def write_picture(path, view, image, title, bar=None, extend="neither"):
     save(fig, path, dpi=100)
 
 
-def show(ax, view, image):
+def show(ax: Any, view: View, image: np.ndarray) -> None:
     """A rendered image in matplotlib axes, with scale and directions."""
     ax.imshow(image)
     ax.set_axis_off()

@@ -1,9 +1,12 @@
 """Pictures of where walls touch: a translucent deformed body, its facing walls coloured by their signed
 distance."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
-from pneunet.base.pictures.rendering import coloured, render, view_of, write_picture
+from pneunet.base.pictures.rendering import View, coloured, render, view_of, write_picture
 
 FIELD = "wall_distance_mm"
 COLOURS = "RdYlBu"
@@ -17,7 +20,16 @@ RIM = {"color": "black", "line_width": 4.0, "lighting": False}
 LABEL = "distance of facing walls (mm); below zero: overlap"
 
 
-def draw_walls(path, body, edges, walls, gap, title, touching=0.0, view=None):
+def draw_walls(
+    path: str | Path,
+    body: Any,
+    edges: Any,
+    walls: Any,
+    gap: float,
+    title: str,
+    touching: float = 0.0,
+    view: View | None = None,
+) -> None:
     """Write the picture; pyvista meshes in mm, `walls` with point data FIELD.
 
     The colours are centred on touching walls and reach as far as the gap at rest (mm), or as the deepest

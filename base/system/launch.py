@@ -9,11 +9,13 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from pneunet.base.system.doorman import end_with_parent
 from pneunet.base.system.log import RANK_VARIABLES
-from pneunet.base.system.processes import end_with_parent, environment_without_launcher
+from pneunet.base.system.processes import environment_without_launcher
 
 # Variables of Open MPI 4 (OMPI_...) and 5 (PRTE_... for its launcher). A value the user has set wins.
 SETTINGS = {
@@ -76,7 +78,9 @@ def run(ranks: int, command: list[str]) -> int:
             print(f"pneunet run: {needed} not found (make setup; pneunet doctor tells more)", file=sys.stderr)
             return 127
     # killed ourselves, even by SIGKILL, we leave no ranks behind that would write into the next run's results
-    with subprocess.Popen(line, env=env, preexec_fn=end_with_parent) as process:
+    with subprocess.Popen(
+        line, env=env, preexec_fn=end_with_parent if os.name == "posix" else None
+    ) as process:
         # Told to end, we tell mpirun, so that no rank is left behind.
         previous = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
         try:
@@ -98,7 +102,7 @@ def run(ranks: int, command: list[str]) -> int:
 
 
 @contextmanager
-def rank_map():
+def rank_map() -> Iterator[Callable | None]:
     """A `map` that spreads its calls over the MPI ranks when a launcher has started us, Python's own
     otherwise.
 

@@ -1,13 +1,10 @@
 """Child processes that a long run can rely on: free of an MPI launcher's marks, gone with their parent,
 within limits.
 
-Run as a script this file is the doorman of a child: it sets the limits on itself and becomes the command.
-(Python's own way, a function between fork and exec, is not safe in a process with MPI's threads.)
+Importable on any system; children are run within limits on Linux alone.
 """
 
-import ctypes
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -15,20 +12,24 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from pneunet.base.quantities import Checked, quantity
+
 #: variables by which MPI launchers (Open MPI 4 and 5, MPICH, SLURM's PMI) tell a process that it is one of
 #: their ranks
 LAUNCHER_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_")
 POLL_SECONDS = 0.02
 MB = 1 << 20
+#: the script that a child starts as
+DOORMAN = Path(__file__).with_name("doorman.py")
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(Checked):
     """What one child may take: wall time in s, memory (RLIMIT_DATA: heap and private maps of each process) in
     MB; None: all."""
 
-    seconds: float | None = None
-    memory_MB: float | None = None
+    seconds: float | None = quantity("s", None, key="time_s", above=0)
+    memory_MB: float | None = quantity("MB", None, key="memory_MB", above=0)
 
 
 @dataclass(frozen=True)
@@ -42,26 +43,27 @@ class Ended:
     out_of_time: bool
 
 
-def environment_without_launcher():
+def environment_without_launcher() -> dict[str, str]:
     """This process's environment, in which a child that starts MPI does not take itself for a rank of our
     launcher."""
     return {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_PREFIXES)}
 
 
-def end_with_parent(number=signal.SIGTERM):
-    """Have the kernel send this process a signal when the thread that started it ends, even by SIGKILL."""
-    PR_SET_PDEATHSIG = 1
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, number)
-
-
-def run_limited(command, limits, log, environment=None, directory=None):
-    """Run `command` (list of str) to its end or its limits; returns Ended.
+def run_limited(
+    command: list[str],
+    limits: Limits,
+    log: str | Path,
+    environment: dict[str, str] | None = None,
+    directory: str | Path | None = None,
+) -> Ended:
+    """Run `command` to its end or its limits; returns Ended.
 
     Standard output and error go to the file `log`. The child leads a process group that is killed with all
     its members when the time is over, when we are interrupted, and when the child ends and leaves some
     behind. It dies with us.
     """
-    doorman = [sys.executable, "-P", __file__, str(os.getpid()), str(int((limits.memory_MB or 0) * MB))]
+    memory = int((limits.memory_MB or 0) * MB)
+    doorman = [sys.executable, "-P", str(DOORMAN), str(os.getpid()), str(memory)]
     started = time.monotonic()
     deadline = started + (limits.seconds or float("inf"))
     out_of_time = False
@@ -88,24 +90,14 @@ def run_limited(command, limits, log, environment=None, directory=None):
     return Ended(child.returncode, time.monotonic() - started, ended[2].ru_maxrss / 1024, out_of_time)
 
 
-def _kill_group(leader):
+def _kill_group(leader: int) -> None:
     try:
         os.killpg(leader, signal.SIGKILL)
     except (ProcessLookupError, PermissionError):
         pass  # nobody is left
 
 
-def _become(parent, memory, command):
-    end_with_parent(signal.SIGKILL)
-    if os.getppid() != parent:
-        sys.exit("the process that started this one is gone")
-    if memory:
-        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    os.execvp(command[0], command)
-
-
-def machine_memory_MB():
+def machine_memory_MB() -> float:
     """Physical memory of this machine in MB; of a container with a limit of its own, that limit (cgroup
     version 2)."""
     total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
@@ -114,7 +106,3 @@ def machine_memory_MB():
     except (OSError, ValueError):
         pass  # no such file, or "max"
     return total / MB
-
-
-if __name__ == "__main__":
-    _become(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])

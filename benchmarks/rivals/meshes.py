@@ -84,11 +84,10 @@ def owners(tets, facets):
 def rules():
     from basix import CellType, make_quadrature
 
-    from pneunet.hifi.body.problem import VOLUME_DEGREE
-    from pneunet.hifi.fem.loads import PRESSURE_DEGREE
+    from pneunet.hifi.fem.mixed_field import DEGREE
 
-    volume = make_quadrature(CellType.tetrahedron, VOLUME_DEGREE)
-    facet = make_quadrature(CellType.triangle, PRESSURE_DEGREE)
+    volume = make_quadrature(CellType.tetrahedron, DEGREE)
+    facet = make_quadrature(CellType.triangle, DEGREE)
     return {
         "volume_points": volume[0],
         "volume_weights": volume[1],

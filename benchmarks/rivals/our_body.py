@@ -11,7 +11,7 @@ from benchmarks.rivals.meshes import segment
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.hifi.body.manipulator import ManipulatorSolve
-from pneunet.hifi.body.problem import MixedProblem, Support
+from pneunet.hifi.body.problem import BodyProblem, Support
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.loads import Pressure
 from pneunet.hifi.fem.solver import DirectSolver
@@ -24,7 +24,7 @@ class OurBody(Body):
     def __init__(self, path, comm=MPI.COMM_WORLD):
         super().__init__()
         self.pressure = Pressure((tags.CAVITY, tags.CHANNEL))
-        self.problem = MixedProblem(
+        self.problem = BodyProblem(
             *compat.read_mesh(path, comm), NeoHookean(MU), [Support(tags.BASE)], [self.pressure]
         )
         self.dofs, self.speaks = self.problem.dofs, comm.rank == 0

@@ -11,7 +11,7 @@ from pneunet.base.strains import RodStrains
 from pneunet.design.report.labels import plain
 from pneunet.design.report.rundata import DesignFolder
 from pneunet.design.target.metrics import Errors, compare
-from pneunet.reduced.model import doubts, predict
+from pneunet.reduced import doubts, predict
 from pneunet.reduced.rod.laws import SegmentLaw
 
 # what the words of the verdict mean, in % of length (RMS of points paired by arc length)

@@ -82,7 +82,7 @@ def chamber_plan(segment: Segment, x: float, thickness: float, half_width: float
 
 
 def draw_drawing(design: DesignFile, path: str | Path) -> None:
-    """Write the drawing of a `geometry.designfile.Design` as a PNG (or SVG, PDF: by the suffix of `path`)."""
+    """Write the drawing of a DesignFile as a PNG (or SVG, PDF: by the suffix of `path`)."""
     figure = drawing_figure(design)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=130)

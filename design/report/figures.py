@@ -14,7 +14,7 @@ from pneunet.design.report.drawing import chamber_plan
 from pneunet.design.report.labels import FINITE_ELEMENTS, plain, segment_colour
 from pneunet.design.report.pictures import curve_panels, legend, segment_bands
 from pneunet.design.report.rundata import DesignFolder
-from pneunet.reduced.model import predict
+from pneunet.reduced import predict
 from pneunet.reduced.rod.laws import SegmentLaw
 
 

@@ -1,17 +1,19 @@
 """Pictures of centrelines in matplotlib: 3D with equal scale, two projections, and the picture of a
 design."""
 
-import logging
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pneunet.base.pictures.rendering import camera_angles, figure, save
+from pneunet.base.pictures.rendering import camera_angles, figure
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report.labels import STYLES, plain, segment_colour, segment_name, significant
 from pneunet.design.target.metrics import Errors
+from pneunet.design.target.target import Target
+from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Manipulator
+from pneunet.reduced.rod.centreline import Centreline
 
 if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes
@@ -19,10 +21,6 @@ if TYPE_CHECKING:
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from pneunet.design.design import Design
-
-log = logging.getLogger(__name__)
 
 
 def equal_axes_3d(ax: "Axes", points: np.ndarray, pad: float = 0.06) -> None:
@@ -128,30 +126,20 @@ def error_caption(errors: Errors) -> str:
     )
 
 
-def design_figure(design: "Design") -> "Figure":
-    """Target against the reduced prediction of a pneunet.design.design.Design, errors, segments, pressure."""
-    line, content = design.prediction, design.content
+def design_figure(
+    content: DesignFile, line: Centreline, target: Target | None = None, errors: Errors | None = None
+) -> "Figure":
+    """A design's predicted line against its target, with errors, segments and pressure."""
     curves = [("reduced prediction", line.points, "reduced")]
     caption = "no target beside the design: only the prediction is shown"
-    if design.target is not None and design.errors is not None:
-        curves.insert(0, ("target", design.target.points, "target"))
-        caption = error_caption(design.errors)
-    fig = figure(12.0, 7.0)
-    curve_panels(fig, curves, segment_bands(design.manipulator, line.s, line.points), bottom=0.15)
-    legend(fig, curves, design.manipulator)
+    if target is not None and errors is not None:
+        curves.insert(0, ("target", target.points, "target"))
+        caption = error_caption(errors)
+    fig, body = figure(12.0, 7.0), content.manipulator
+    curve_panels(fig, curves, segment_bands(body, line.s, line.points), bottom=0.15)
+    legend(fig, curves, body)
     fig.text(0.025, 0.975, content.name, fontsize=15, weight="bold", va="top")
-    told = f"{plain(design.pressure_kPa)} kPa, {design.manipulator.chambers} chambers"
-    told += f", {plain(design.manipulator.length, 1)} mm long at rest"
-    fig.text(0.025, 0.925, told, fontsize=10, va="top")
+    told = f"{plain(content.pressure * KPA_PER_MPA)} kPa, {body.chambers} chambers"
+    fig.text(0.025, 0.925, f"{told}, {plain(body.length, 1)} mm long at rest", fontsize=10, va="top")
     fig.text(0.025, 0.02, caption, fontsize=9, linespacing=1.5)
     return fig
-
-
-def draw_design(design: "Design", path: str | Path) -> bool:
-    """Write design_figure as a PNG; False, with a line in the log, without matplotlib."""
-    try:
-        save(design_figure(design), path)
-    except ImportError:
-        log.info("no picture: matplotlib is missing, install it with: pip install 'pneunet[pictures]'")
-        return False
-    return True

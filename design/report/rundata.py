@@ -7,45 +7,38 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import read_columns, read_csv
+from pneunet.base.files.schemas import (
+    CENTRELINE,
+    CENTRELINES,
+    POINT,
+    SEGMENTS,
+    STEPS,
+    STRAINS,
+    TARGET,
+    WALLS,
+    WORDS,
+    read_table,
+)
 from pneunet.base.strains import RodStrains
-from pneunet.base.units import KPA_PER_MPA
-from pneunet.geometry.designfile import Design, body_tables, read_design
+from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
+from pneunet.geometry.designfile import DesignFile, body_tables, read_design_file
 from pneunet.reduced.choice import TRAINED
-
-POINTS = ["x_mm", "y_mm", "z_mm"]
-STEP_COLUMNS = [
-    "step",
-    "pressure_kPa",
-    "iterations",
-    "factorisations",
-    "volume_mm3",
-    "tip_x_mm",
-    "tip_y_mm",
-    "tip_z_mm",
-    "smallest_wall_distance_mm",
-    "walls_overlap",
-    "body_distance_mm",
-    "body_overlap",
-    "largest_stretch",
-    "seconds",
-]
 
 
 @dataclass(frozen=True)
 class Solution:
     """The finite element solution. Lengths in mm, body frame; kPa as in the files.
 
-    steps: {column: (n,)}, "seconds" counted from the start; pressure of the last accepted step in MPa; s
-    (m,), points (m, 3): its centreline; strains: RodStrains of shape (segments, 3) at that step; walls:
-    [(segment 1.., side +1/-1, gap 1.., distance)] of the gaps that have walls; history: [(pressure in MPa, s,
-    points)] of all steps; solution: the ParaView file, or None; record: run.json.
+    steps: steps.csv as a structured array (n,), "seconds" counted from the start; pressure of the last
+    accepted step in MPa; s (m,), points (m, 3): its centreline; strains: RodStrains of shape (segments, 3) at
+    that step; walls: [(segment 1.., side +1/-1, gap 1.., distance)] of the gaps that have walls; history:
+    [(pressure in MPa, s, points)] of all steps; solution: the ParaView file, or None; record: run.json.
 
     From the first touch of walls without contact, or of parts that are far apart along the body, the steps
     are marked (columns walls_overlap, body_overlap): they are not what a real body does.
     """
 
-    steps: dict
+    steps: np.ndarray
     pressure: float
     s: np.ndarray
     points: np.ndarray
@@ -56,7 +49,7 @@ class Solution:
     record: dict
 
     def __repr__(self) -> str:
-        reached = f"{len(self.steps['step'])} steps to {self.pressure_kPa:.4g} kPa"
+        reached = f"{len(self.steps)} steps to {self.pressure_kPa:.4g} kPa"
         return f"<Solution: {reached}, tip at {self.tip.round(2)} mm>"
 
     @property
@@ -95,7 +88,7 @@ class DesignFolder:
     than design.toml's, which is left out."""
 
     directory: Path
-    design: Design
+    design: DesignFile
     target: np.ndarray | None
     centreline: tuple | None
     record: dict
@@ -116,15 +109,14 @@ def read_design_folder(directory: str | Path) -> "DesignFolder":
         raise InputError(f"{directory}: holds no design.toml: give the folder that `pneunet design -o` wrote")
     target = directory / "target.csv"
     centreline = directory / "centreline.csv"
-    columns = read_columns(centreline, ["s_mm", *POINTS]) if centreline.is_file() else None
-    design, solve = read_design(directory / "design.toml"), _solve(directory / "solve")
+    design, solve = read_design_file(directory / "design.toml"), _solve(directory / "solve")
     ours = {"body": body_tables(design.manipulator), "loads": design.loads.table()}
     stale = solve is not None and any(solve.record.get(name, value) != value for name, value in ours.items())
     return DesignFolder(
         directory,
         design,
-        read_columns(target, POINTS) if target.is_file() else None,
-        None if columns is None else (columns[:, 0], columns[:, 1:]),
+        _columns(read_table(target, TARGET), TARGET) if target.is_file() else None,
+        _centreline(read_table(centreline, CENTRELINE)) if centreline.is_file() else None,
         _json(directory / "run.json"),
         _json(directory / "mesh" / "mesh.json"),
         None if stale else solve,
@@ -146,42 +138,45 @@ def _solve(directory):
     """The solve, if a step beyond the rest state was accepted; else None."""
     if not (directory / "steps.csv").is_file():
         return None
-    table = read_columns(directory / "steps.csv", STEP_COLUMNS)
-    if len(table) < 2:
+    steps = read_table(directory / "steps.csv", STEPS)
+    if len(steps) < 2:
         return None
-    last = table[-1, 0]
-    centrelines = read_columns(directory / "centrelines.csv", ["step", "s_mm", *POINTS])
-    centreline = centrelines[centrelines[:, 0] == last]
-    strains = read_columns(
-        directory / "segments.csv", ["step", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"]
-    )
-    strains = strains[strains[:, 0] == last]
-    solution = directory / "solution.pvd"
+    lines = read_table(directory / "centrelines.csv", CENTRELINES)
+    segments = read_table(directory / "segments.csv", SEGMENTS)
+    last, solution = steps[-1]["step"], directory / "solution.pvd"
+    s, points = _centreline(lines[lines["step"] == last])
+    strains = _columns(segments[segments["step"] == last], STRAINS)
     return Solution(
-        steps=dict(zip(STEP_COLUMNS, table.T)),
-        pressure=table[-1, 1] * 1e-3,
-        s=centreline[:, 1],
-        points=centreline[:, 2:],
-        strains=RodStrains(strains[:, 1:4], strains[:, 4:7]),
-        history=[(row[1] * 1e-3, *_step(centrelines, row[0])) for row in table[1:]],
+        steps=steps,
+        pressure=steps[-1]["pressure_kPa"] * MPA_PER_KPA,
+        s=s,
+        points=points,
+        strains=RodStrains(strains[:, :3], strains[:, 3:]),
+        history=[
+            (step["pressure_kPa"] * MPA_PER_KPA, *_centreline(lines[lines["step"] == step["step"]]))
+            for step in steps[1:]
+        ],
         walls=_walls(directory / "walls.csv"),
         solution=solution if solution.is_file() else None,
         record=_json(directory / "run.json"),
     )
 
 
-def _step(centrelines, number):
-    rows = centrelines[centrelines[:, 0] == number]
-    return rows[:, 1], rows[:, 2:]
+def _columns(table, names):
+    """(n, names) of a table from pneunet.base.files.schemas.read_table."""
+    return np.column_stack([table[name] for name in names])
+
+
+def _centreline(table):
+    """Arc lengths (n,) and points (n, 3), mm."""
+    return table["s_mm"], _columns(table, POINT)
 
 
 def _walls(path):
     if not path.is_file():
         return []
-    header, rows = read_csv(path)
-    read = [dict(zip(header, row)) for row in rows]
-    found = [
-        (int(r["segment"]), 1 if r["side"] == "top" else -1, int(r["gap"]), float(r["distance_mm"]))
-        for r in read
+    table = read_table(path, [name for name in WALLS if name not in WORDS])
+    return [
+        (int(row["segment"]), 1 if row["side"] == "top" else -1, int(row["gap"]), float(row["distance_mm"]))
+        for row in table[np.isfinite(table["distance_mm"])]
     ]
-    return [gap for gap in found if np.isfinite(gap[3])]

@@ -15,7 +15,7 @@ from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.centreline import Centreline, centreline
-from pneunet.reduced.rod.ends import free_manipulator
+from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import SegmentLaw
 
 PAIRED, EQ27 = "paired", "eq27"
@@ -50,7 +50,7 @@ class Trial:
 
     def centreline(self, law: SegmentLaw, base_point: np.ndarray) -> Centreline:
         """The Centreline from base_point (3,), mm."""
-        pieces = free_manipulator(self.segments, law.each(self.segments, self.pressure), self.counts)
+        pieces = free_pieces(self.segments, law.each(self.segments, self.pressure), self.counts)
         return centreline(*pieces, SPACING, se3.make_pose(self.rotation, base_point))
 
 

@@ -3,15 +3,16 @@
 Every bad input is one line that names the key and the fix.
 """
 
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_csv
-from pneunet.base.files.toml import file_key, number, read_toml, refuse_unknown
+from pneunet.base.files.schemas import TARGET
+from pneunet.base.files.toml import number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
+from pneunet.base.quantities import quantities
 from pneunet.base.strains import helix_frenet
 from pneunet.base.units import MPA_PER_KPA, PER_MM_PER_M
 from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, TWISTING, Piece, Target
@@ -19,15 +20,14 @@ from pneunet.geometry.parameters import Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
-POINT_COLUMNS = ("x_mm", "y_mm", "z_mm")
 FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
 
 #: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
 #: found, and a bottom layer is no variable of the inverse design
 START_KEYS = {
-    file_key(f): f.name
-    for f in fields(Segment)
-    if f.metadata.get("unit") == "mm" and f.name != "layer_thickness"
+    key: f.name
+    for key, f in quantities(Segment).items()
+    if f.metadata["unit"] == "mm" and f.name != "layer_thickness"
 }
 SHARED = ("width", "channel_width", "channel_height", "cavity_floor", "end_margin")
 VARY_KEYS = {"angle_deg": "angle"} | {key: name for key, name in START_KEYS.items() if name not in SHARED}
@@ -77,15 +77,15 @@ def _read_points(path):
     if all(_is_number(cell) for cell in header):
         if len(header) != 3:
             raise InputError(f"{path}: a CSV without a header has 3 columns x, y, z in mm, not {len(header)}")
-        header, rows, skipped = list(POINT_COLUMNS), [first, *rows], 0
+        header, rows, skipped = list(TARGET), [first, *rows], 0
     else:
         skipped = 1
-        refuse_unknown(dict.fromkeys(header), [*POINT_COLUMNS, *FRAME_COLUMNS], f"{path} header")
+        refuse_unknown(dict.fromkeys(header), [*TARGET, *FRAME_COLUMNS], f"{path} header")
     values = _numbers(path, header, rows, skipped)
-    missing = [c for c in POINT_COLUMNS if c not in values]
+    missing = [c for c in TARGET if c not in values]
     if missing:
         raise InputError(f"{path}: column '{missing[0]}' is missing")
-    points = np.column_stack([values[c] for c in POINT_COLUMNS])
+    points = np.column_stack([values[c] for c in TARGET])
     return points, _frames_of(values, path) if "t1x" in values or "t2x" in values else None
 
 

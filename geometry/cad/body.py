@@ -5,19 +5,22 @@ with the channel; everything fragmented, so that the boundary of the cavity volu
 surface. The cavities are then removed and the faces tagged.
 """
 
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.geometry import tags
+from pneunet.geometry.parameters import Manipulator, Segment
 
 _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
 
 
 @contextmanager
-def session(name="pneunet"):
+def session(name: str = "pneunet") -> Iterator[Any]:
     """A gmsh session with one empty model; quiet, and closed whatever happens."""
     gmsh.initialize()
     try:
@@ -28,7 +31,7 @@ def session(name="pneunet"):
         gmsh.finalize()
 
 
-def prism(corners, z0, z1):
+def prism(corners: np.ndarray, z0: float, z1: float) -> int:
     """Volume tag of a prism over the plan polygon `corners` (n, 2) between heights z0 and z1 (mm)."""
     occ = gmsh.model.occ
     points = [occ.addPoint(x, y, z0) for x, y in corners]
@@ -37,7 +40,7 @@ def prism(corners, z0, z1):
     return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, z1 - z0) if dim == 3)
 
 
-def slanted_plan(x, thickness, half_width, segment, side):
+def slanted_plan(x: float, thickness: float, half_width: float, segment: Segment, side: int) -> np.ndarray:
     """Plan corners (4, 2) of a chamber centred at x: `thickness` normal, between y = -half_width and
     +half_width."""
     half = thickness / segment.sin / 2
@@ -52,23 +55,28 @@ def slanted_plan(x, thickness, half_width, segment, side):
     )
 
 
-def box(x0, x1, half_width, z0, z1):
+def box(x0: float, x1: float, half_width: float, z0: float, z1: float) -> int:
+    """Volume tag of a box that lies evenly about y = 0 (mm)."""
     return gmsh.model.occ.addBox(x0, -half_width, z0, x1 - x0, 2 * half_width, z1 - z0)
 
 
-def chamber_block(segment, x, side, thickness, half_width, z0, z1):
+def chamber_block(
+    segment: Segment, x: float, side: int, thickness: float, half_width: float, z0: float, z1: float
+) -> int:
+    """Volume tag of a slanted block centred at x: z0 to z1 above the axis, below it on side -1 (mm)."""
     low, high = sorted((side * z0, side * z1))
     return prism(slanted_plan(x, thickness, half_width, segment, side), low, high)
 
 
-def fuse(tags, unify):
+def fuse(tags: list[int], unify: bool) -> list[tuple[int, int]]:
+    """[(3, tag)] of volumes made one; unify: faces in one plane become one."""
     gmsh.option.setNumber("Geometry.OCCUnionUnify", int(unify))
     if len(tags) == 1:
         return [(3, tags[0])]
     return gmsh.model.occ.fuse([(3, tags[0])], [(3, t) for t in tags[1:]])[0]
 
 
-def outer_solids(segment, start):
+def outer_solids(segment: Segment, start: float) -> list[int]:
     """Volume tags of one segment's core and chamber blocks, not yet fused; x begins at `start` (mm)."""
     s = segment
     tags = [box(start, start + s.length, s.width / 2, s.core_bottom, s.core_top)]
@@ -79,7 +87,7 @@ def outer_solids(segment, start):
     return tags
 
 
-def cavity_solids(segment, start, channel_from, channel_to):
+def cavity_solids(segment: Segment, start: float, channel_from: float, channel_to: float) -> list[int]:
     """Volume tags of one segment's chamber cavities and its stretch of channel (clipped to the given x
     range)."""
     s = segment
@@ -97,7 +105,7 @@ def cavity_solids(segment, start, channel_from, channel_to):
     return tags
 
 
-def layer_solid(segment, start, stop):
+def layer_solid(segment: Segment, start: float, stop: float) -> list[int]:
     """[volume tag] of the bottom layer between two x (mm); empty when the segment has none."""
     return (
         [box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)]
@@ -106,12 +114,12 @@ def layer_solid(segment, start, stop):
     )
 
 
-def pieces(children):
+def pieces(children: Iterable[list[tuple[int, int]]]) -> set[tuple[int, int]]:
     """Volumes among the children that OpenCASCADE's fragment reports of some of its arguments."""
     return {v for family in children for v in family if v[0] == 3}
 
 
-def channel_range(manipulator):
+def channel_range(manipulator: Manipulator) -> tuple[float, float]:
     """x (mm) at which the channel begins and ends: half a pitch beyond the first and the last chamber, so
     that every chamber has its whole cell; what remains of the passive ends closes it."""
     first, last = manipulator.segments[0], manipulator.segments[-1]
@@ -121,7 +129,7 @@ def channel_range(manipulator):
     )
 
 
-def build(manipulator):
+def build(manipulator: Manipulator) -> dict[str, float]:
     """Build the manipulator in the current gmsh model: one body volume per segment (two with a bottom layer),
     tagged faces, one closed cavity.
 
@@ -177,7 +185,7 @@ def build(manipulator):
     return volumes
 
 
-def in_channel(segment, box):
+def in_channel(segment: Segment, box: tuple[float, ...]) -> bool:
     """Whether a cavity face with this bounding box (6 numbers) is a piece of the channel's wall (its ends are
     not)."""
     x0, y0, z0, x1, y1, z1 = box

@@ -11,11 +11,20 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
+from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
+from pneunet.geometry.parameters import Segment
 from pneunet.geometry.tags import AIR, GAP
 
 
-def mesh_cell(segment, mesh_size, path, cut=0.0, gaps=False, edge_size=None):
+def mesh_cell(
+    segment: Segment,
+    mesh_size: float,
+    path: str | Path,
+    cut: float = 0.0,
+    gaps: bool = False,
+    edge_size: float | None = None,
+) -> dict[str, float]:
     """Write the cell's mesh to `path`; returns {"body_mm3", "air_mm3", "cells"}.
 
     x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). `gaps`: mesh the space between the
@@ -63,9 +72,9 @@ def _build(segment, half, cut, gaps):
                 )
             )
     solids = []
-    for tags, unify in ((outer, True), (inner, False)):
+    for blocks, unify in ((outer, True), (inner, False)):
         slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
-        solids.append(occ.intersect(cad.fuse(tags, unify), [(3, slab)])[0])
+        solids.append(occ.intersect(cad.fuse(blocks, unify), [(3, slab)])[0])
     layer = [(3, tag) for tag in cad.layer_solid(s, -half, half)]
     medium = _gap_solids(s, half, centres[:-1] + s.pitch / 2) if gaps else []
     _, parents = occ.fragment(solids[0], solids[1] + layer + medium)
@@ -120,7 +129,7 @@ def _grade(half, near, far, slope=0.7):
     starts, along = np.array(starts), np.array(along)
     squares = (along**2).sum(axis=1)
 
-    def size(*arguments):  # (dim, tag, x, y, z), and in newer versions the size so far
+    def size(*arguments: float) -> float:  # (dim, tag, x, y, z), and in newer versions the size so far
         offset = np.array(arguments[2:5]) - starts
         nearest = offset - np.clip((offset * along).sum(axis=1) / squares, 0, 1)[:, None] * along
         return float(min(far, near + slope * np.sqrt((nearest**2).sum(axis=1).min())))

@@ -1,6 +1,7 @@
 """Tagged tetrahedral mesh of a manipulator, with the checks that make a mesh fit for use."""
 
 import json
+import logging
 import os
 import time
 from contextlib import contextmanager
@@ -10,13 +11,29 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import atomic_path, write_text
+from pneunet.base.files.atomic import atomic_path, output_directory, write_text
 from pneunet.base.files.toml import to_table
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
+from pneunet.geometry.designfile import read_design_file
+from pneunet.geometry.parameters import Manipulator
+
+log = logging.getLogger(__name__)
 
 
-def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
+def mesh_design(path: str | Path, directory: str | Path, mesh_size: float | None = None) -> dict:
+    """`pneunet mesh`: mesh a design's file into directory/mesh; mesh_size (mm) by default the design's.
+
+    The answer of `mesh_manipulator`, which raises what this raises.
+    """
+    content = read_design_file(path)
+    folder = output_directory(directory) / "mesh"
+    facts = mesh_manipulator(content.manipulator, mesh_size or content.mesh_size, folder)
+    log.info(f"written: {folder / 'manipulator.msh'}, manipulator.step, mesh.json")
+    return facts
+
+
+def mesh_manipulator(manipulator: Manipulator, mesh_size: float, directory: str | Path) -> dict:
     """Write manipulator.msh, manipulator.step and mesh.json to `directory`; return the content of mesh.json.
 
     mesh_size in mm (tetrahedron edge). Raises InputError when gmsh cannot mesh it or a check fails; nothing
@@ -32,7 +49,7 @@ def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
     with cad.session():
         try:
             volumes = cad.build(manipulator)
-            say(
+            log.info(
                 f"CAD: body {volumes['body_mm3']:.1f} mm3, cavity {volumes['cavity_mm3']:.1f} mm3"
                 f" ({time.perf_counter() - started:.1f} s)"
             )
@@ -61,14 +78,14 @@ def mesh_manipulator(manipulator, mesh_size, directory, say=lambda text: None):
             gmsh.write(str(temporary))
     facts["seconds"] = time.perf_counter() - started
     write_text(directory / "mesh.json", json.dumps(facts, indent=1) + "\n")
-    say(
+    log.info(
         f"mesh: {facts['cells']} cells, {facts['vertices']} vertices, cavity closed, smallest quality"
         f" {facts['smallest_quality']:.2f}"
     )
     return facts
 
 
-def segment_tables(manipulator):
+def segment_tables(manipulator: Manipulator) -> list[dict]:
     """What a mesh depends on, in file units: every dimension, no material."""
     return [to_table(s) for s in manipulator.segments]
 
@@ -101,7 +118,7 @@ def _facet_nodes(tag):
     return np.concatenate(nodes).astype(int) if nodes else np.zeros((0, 3), int)
 
 
-def tet_volumes_and_quality(corners):
+def tet_volumes_and_quality(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Signed volumes (n,) in mm3 and mean-ratio quality (n,), 1 for a regular tetrahedron, of corners (n, 4,
     3)."""
     edges = corners[:, [1, 2, 3, 2, 3, 3]] - corners[:, [0, 0, 0, 1, 1, 2]]
@@ -109,7 +126,7 @@ def tet_volumes_and_quality(corners):
     return volumes, 12 * np.cbrt(3 * volumes) ** 2 * np.sign(volumes) / np.einsum("nei,nei->n", edges, edges)
 
 
-def open_edges(nodes):
+def open_edges(nodes: np.ndarray) -> int:
     """Number of edges of a triangle soup (n, 3) that are not shared by exactly two triangles; 0 for a closed
     surface."""
     edges = np.sort(np.concatenate([nodes[:, [0, 1]], nodes[:, [1, 2]], nodes[:, [2, 0]]]), axis=1)

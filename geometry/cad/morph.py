@@ -8,10 +8,10 @@ of another.
 
 import numpy as np
 
-from pneunet.geometry.parameters import TWISTING
+from pneunet.geometry.parameters import TWISTING, Segment
 
 
-def moved(points, segment, other):
+def moved(points: np.ndarray, segment: Segment, other: Segment) -> np.ndarray:
     """(n, 3) places in the cell of `other` of points (n, 3) of the cell of `segment` (mm), a chamber of both
     centred at X1 = 0.
 

@@ -1,6 +1,8 @@
 """The same periodic body cut elsewhere: part of a cell's tetrahedra moved by one pitch, every one as it
 was."""
 
+from pathlib import Path
+
 import gmsh
 import numpy as np
 
@@ -8,7 +10,7 @@ from pneunet.geometry.cad import body as cad
 from pneunet.geometry.tags import AIR
 
 
-def recut(path, other, pitch, beyond):
+def recut(path: str | Path, other: str | Path, pitch: float, beyond: float) -> None:
     """Write to `other` the cell meshed at `path` with the tetrahedra whose centroid has x > `beyond` (mm) one
     pitch to the left.
 

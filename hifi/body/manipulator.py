@@ -8,7 +8,7 @@ from mpi4py import MPI
 from pneunet.base import se3
 from pneunet.geometry import tags
 from pneunet.geometry.loading import DeadLoads
-from pneunet.hifi.body.problem import MixedProblem, Support
+from pneunet.hifi.body.problem import BodyProblem, Support
 from pneunet.hifi.body.system import BodySystem
 from pneunet.hifi.contact.body import BodyContact
 from pneunet.hifi.contact.body_distance import BodyDistance
@@ -87,7 +87,7 @@ class ManipulatorSolve:
         self.pressure = Pressure((tags.CAVITY, tags.CHANNEL))
         self.dead = _dead(loads or DeadLoads(), materials)
         supports = [Support(tags.BASE)] + [Support(tags.TIP)] * hold_tip
-        self.problem = MixedProblem(
+        self.problem = BodyProblem(
             mesh, cell_tags, facet_tags, materials, supports, [self.pressure, *self.dead]
         )
         spacing = float(np.mean([s.pitch for s in manipulator.segments]))
@@ -99,11 +99,9 @@ class ManipulatorSolve:
         if contact:
             owners = [manipulator.segments[number - 1] for number, _, _, _ in self.walls.gaps]
             laws = [contact.on(s.material.mu, s.gap) for s in owners]
-            self.problem.contact = (
-                BodyContact(self.problem, self.walls, laws, [s.gap for s in owners]) if laws else None
-            )
+            self.problem.contact = BodyContact(self.problem, self.walls, laws)
         #: what the accepted states have met
-        self.watch = TouchWatch(self.problem.contact is not None)
+        self.watch = TouchWatch(self.problem.contact.gaps > 0)
         self.stretch = PrincipalStretch(self.problem)
         #: hifi.path.stepping.Step of the last accepted state
         self.last_step = None
@@ -159,9 +157,9 @@ class ManipulatorSolve:
 
     def _touch(self, walls):
         """The Touch of the current state, the same on all ranks; `walls` on rank 0."""
-        body, contact = self.body_distance.smallest(), self.problem.contact
+        body = self.body_distance.smallest()
         nearest = (float(walls.min(initial=np.inf)), body) if self.comm.rank == 0 else None
-        force = np.linalg.norm(contact.forces(), axis=1).max() if contact else 0.0
+        force = np.linalg.norm(self.problem.contact.forces(), axis=1).max(initial=0.0)
         load = Load(float(self.pressure.value.value), self._dead_fraction)
         return self.watch.see(load, *self.comm.bcast(nearest, root=0), float(force))
 

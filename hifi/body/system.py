@@ -1,4 +1,4 @@
-"""A MixedProblem as a system for Newton's method: section-frame updates and a tangent that turns with the
+"""A BodyProblem as a system for Newton's method: section-frame updates and a tangent that turns with the
 body."""
 
 import numpy as np
@@ -70,23 +70,17 @@ class BodySystem:
         self.problem.assemble_tangent(self._matrix)
         self.solver.factorise()
         self._rotation_then = self._rotations()
-        contact = self.problem.contact
-        self._update = ContactUpdate(
-            contact.stiffnesses(factorised=True) if contact else {}, MOST_TOUCHES, self.comm.allreduce
-        )
+        touching = self.problem.contact.stiffnesses(factorised=True)
+        self._update = ContactUpdate(touching, MOST_TOUCHES, self.comm.allreduce)
 
     @property
     def overreach(self):
-        return self.problem.contact.overreach if self.problem.contact else 0.0
+        return self.problem.contact.overreach
 
     def renew(self):
         """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
         contact = self.problem.contact
-        return (
-            self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns)
-            if contact
-            else False
-        )
+        return self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns)
 
     def _solve_columns(self, right):
         return np.column_stack([self._solve(column) for column in right.T])

@@ -1,15 +1,17 @@
 """CELL.toml: the case of a unit cell that `pneunet cell` and studies solve."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import as_table, number, read_toml, refuse_unknown, to_table
 from pneunet.base.materials.laws import material_from_table, material_to_table
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.parameters import Segment
 from pneunet.hifi.contact.medium import ThirdMedium
 from pneunet.hifi.contact.penalty import WallPenalty
-from pneunet.hifi.runs.solve.tables import KPA
 
 STRAINS = ("e1", "e2", "e3", "k1_per_mm", "k2_per_mm", "k3_per_mm")
 CONTROLS = ("pressure", "volume")
@@ -47,12 +49,12 @@ class CellCase:
     graded: bool = False
 
 
-def read_cell(path):
+def read_cell(path: str | Path) -> CellCase:
     """The CellCase in a TOML file; InputError with file, table and key otherwise."""
     return cell_from_tables(read_toml(path), str(path))
 
 
-def cell_from_tables(data, where):
+def cell_from_tables(data: dict[str, Any], where: str) -> CellCase:
     """The CellCase in the tables of a CELL.toml; `where` is what errors call them."""
     refuse_unknown(data, KEYS, where)
     for key in ("material", "segment"):
@@ -80,7 +82,7 @@ def cell_from_tables(data, where):
             raise InputError(f"{where}: {key} = {value:g} must lie in {low:g}..{high:g}")
         return value
 
-    pressure = ranged("pressure_kPa", 1.0, 1e-3, 2000) / KPA
+    pressure = ranged("pressure_kPa", 1.0, 1e-3, 2000) / KPA_PER_MPA
     mesh_size = ranged("mesh_size_mm", CellCase.mesh_size, 0.1, 20)
     levels = ranged("levels", CellCase.levels, 1, 1000, integer=True)
     volume_factor = ranged("volume_factor", CellCase.volume_factor, 1.001, 100)
@@ -111,11 +113,11 @@ def cell_from_tables(data, where):
     )
 
 
-def cell_tables(case):
+def cell_tables(case: CellCase) -> dict[str, Any]:
     """The complete tables of a CellCase, which cell_from_tables reads back."""
     segment = case.segment
     tables = {
-        "pressure_kPa": float(f"{case.pressure * KPA:.12g}"),
+        "pressure_kPa": float(f"{case.pressure * KPA_PER_MPA:.12g}"),
         "mesh_size_mm": case.mesh_size,
         "levels": case.levels,
         "control": case.control,

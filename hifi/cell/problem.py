@@ -10,6 +10,9 @@ moments in one bulk term; a little stiffness keeps its inner nodes in place. Ser
 ranks, not cells.
 """
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 import scipy.sparse as sp
 import ufl
@@ -20,15 +23,20 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from pneunet.geometry import tags
-from pneunet.geometry.tags import AIR, GAP
+from pneunet.geometry.parameters import Segment
 from pneunet.hifi.contact.cell import CellContact
-from pneunet.hifi.contact.walls import CellWalls
+from pneunet.hifi.contact.gaps import Contact
+from pneunet.hifi.contact.medium import ThirdMedium
+from pneunet.hifi.contact.penalty import WallPenalty
+from pneunet.hifi.contact.walls import CellWalls, WallContact
 from pneunet.hifi.fem import compat, surface
+from pneunet.hifi.fem.compat import compile_form
 from pneunet.hifi.fem.materials import energy_density
+from pneunet.hifi.fem.mixed_field import MixedField
+from pneunet.hifi.fem.potential import Potential, Term
 from pneunet.hifi.fem.stretch import PrincipalStretch
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
-DEGREE = 4
 #: rows of the gauge that see e2 and e3: a sideways displacement X1 e turns about z and y
 _SIDEWAYS = np.zeros((6, 6))
 _SIDEWAYS[4, 2], _SIDEWAYS[5, 1] = -1, 1
@@ -36,7 +44,7 @@ _SIDEWAYS[4, 2], _SIDEWAYS[5, 1] = -1, 1
 _PLACED = ("segment", "nodes", "gauge", "gauge_strains", "walls", "contact", "_bordered")
 
 
-class CellProblem:
+class CellProblem(MixedField):
     """Unknowns, residual and tangent of the cell of `segment`; mesh: path of geometry.cad.cell.mesh_cell's,
     or the mesh and its tags.
 
@@ -49,37 +57,37 @@ class CellProblem:
     """
 
     def __init__(
-        self, segment, mesh, gauge=(tags.CHANNEL,), centre=0.0, rollers=None, medium=None, contact=None
+        self,
+        segment: Segment,
+        mesh: Path | tuple,
+        gauge: Sequence[int] = (tags.CHANNEL,),
+        centre: float = 0.0,
+        rollers: dict[int, int] | None = None,
+        medium: ThirdMedium | None = None,
+        contact: WallPenalty | None = None,
     ):
-        self.segment, comm, self._gauge_of, self._penalty = segment, MPI.COMM_SELF, (gauge, centre), contact
-        self.mesh, self.cell_tags, self.facet_tags = (
-            mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, comm)
-        )
-        mesh = self.mesh
-        self.medium = medium.on(mesh) if medium else None
-        self.space = compat.mixed_space(mesh)
-        self.state = fem.Function(self.space)
-        self.displacement_space, to_mixed = self.space.sub(0).collapse()
-        self.pressure_space, to_mixed_p = self.space.sub(1).collapse()
-        self.displacement_dofs = np.asarray(to_mixed).reshape(-1, 3)
-        self.pressure_dofs = np.asarray(to_mixed_p)
-        self.strains = fem.Constant(mesh, PETSc.ScalarType(np.eye(6)[0]))
-        self.pressure = fem.Constant(mesh, PETSc.ScalarType(0.0))
-        self._direction = fem.Constant(mesh, PETSc.ScalarType(np.zeros(6)))
+        super().__init__(*(mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, MPI.COMM_SELF)))
+        self.segment, self._gauge_of, self._penalty = segment, (gauge, centre), contact
+        self.medium = medium.on(self.mesh) if medium else None
+        self.strains = fem.Constant(self.mesh, PETSc.ScalarType(np.eye(6)[0]))
+        self.pressure = fem.Constant(self.mesh, PETSc.ScalarType(0.0))
+        self._direction = fem.Constant(self.mesh, PETSc.ScalarType(np.zeros(6)))
         self._define_forms()
-        self.nodes = self.displacement_space.tabulate_dof_coordinates()
         self._reduce(rollers or {})
         self._place()
-        self.stretch = PrincipalStretch(
-            self, self.cell_tags.indices[np.isin(self.cell_tags.values, (tags.BODY, tags.LAYER))]
-        )
+        solid = np.isin(self.cell_tags.values, (tags.BODY, tags.LAYER))
+        self.stretch = PrincipalStretch(self, self.cell_tags.indices[solid])
 
     def _place(self):
         """What depends on where the nodes are."""
-        self.nodes = self.displacement_space.tabulate_dof_coordinates()
+        self.nodes = self.node_positions()
         self._define_gauge(*self._gauge_of)
         self.walls = CellWalls(self)
-        self.contact = CellContact(self, self.walls, self._penalty) if self._penalty else None
+        self.contact = (
+            CellContact(self, self.walls, self._penalty)
+            if self._penalty
+            else Contact(MPI.COMM_SELF, self.unknowns + 6, slice(0, self.unknowns + 6))
+        )
         self._bordered = None
 
     def move(self, segment, vertices):
@@ -98,56 +106,40 @@ class CellProblem:
         vars(self).update(placed)
 
     def _define_forms(self):
-        mesh, material = self.mesh, self.segment.material
-        dx = ufl.Measure(
-            "dx", domain=mesh, subdomain_data=self.cell_tags, metadata={"quadrature_degree": DEGREE}
-        )
-        solid, air = dx(tags.BODY), dx(AIR)
-        q = ufl.variable(self.strains)
-        u, p = ufl.split(self.state)
-        v = ufl.TestFunction(self.space)
-        X = ufl.SpatialCoordinate(mesh)
+        segment, u, q = self.segment, self.u, ufl.variable(self.strains)
+        X = ufl.SpatialCoordinate(self.mesh)
         y = ufl.as_vector((0, X[1], X[2])) + u
-        stretch = ufl.as_vector([q[i] for i in range(3)]) + ufl.cross(
-            ufl.as_vector([q[i] for i in range(3, 6)]), y
-        )
+        e, k = (ufl.as_vector([q[i] for i in part]) for part in (range(3), range(3, 6)))
         grad_y = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]])
         E1 = ufl.unit_vector(0, 3)
-        F = grad_y + ufl.outer(stretch, E1)
-        self.deformation_gradient = F
-        J = ufl.det(F)
-        energies = (
-            (energy_density(mesh, material, F, p), solid),
-            *(
-                (energy_density(mesh, m, F, p), dx(tags.LAYER))
-                for m in [self.segment.layer_material]
-                if m is not None
-            ),
-            (-self.pressure * J + AIR_STIFFNESS * material.mu / 2 * (ufl.inner(F, F) - 2 * J), air),
-        )
+        self.deformation_gradient = F = grad_y + ufl.outer(e + ufl.cross(k, y), E1)
+        J, air = ufl.det(F), self.cells(tags.AIR)
+        mu = fem.Constant(self.mesh, PETSc.ScalarType(segment.material.mu))
+        solids = ((tags.BODY, segment.material), (tags.LAYER, segment.layer_material))
+        terms = [
+            Term(energy_density(self.mesh, material, F, self.p), self.cells(tag))
+            for tag, material in solids
+            if material is not None
+        ]
+        terms.append(Term(AIR_STIFFNESS * mu / 2 * (ufl.inner(F, F) - 2 * J), air, self.pressure * J))
         if self.medium:
             # d(Q F)/dX, rotated back: F's own gradient, and along X1 that of the screw
-            k = ufl.as_matrix([[0, -q[5], q[4]], [q[5], 0, -q[3]], [-q[4], q[3], 0]])
+            spin = ufl.as_matrix([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
             a, b, c = ufl.indices(3)
-            kF, ky = k * F, k * grad_y
+            kF, ky = spin * F, spin * grad_y
             second = ufl.as_tensor(
                 ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c)
             )
-            energies += ((self.medium.density(F, second, material.mu), dx(GAP)),)
-            self._contact = compat.compile_form(ufl.derivative(energies[-1][0] * dx(GAP), self.state, v))
-        residual = sum(ufl.derivative(w * d, self.state, v) for w, d in energies)
-        t = ufl.TestFunction(compat.cell_vectors(mesh, 6))
-        along = [(ufl.inner(ufl.diff(w, q), self._direction), d) for w, d in energies]
-        slope = sum(ufl.inner(ufl.diff(w, q), t) * d for w, d in energies)
-        curvature = sum(ufl.inner(ufl.diff(a, q), t) * d for a, d in along)
-        self._residual = compat.compile_form(residual)
-        self._tangent = compat.compile_form(ufl.derivative(residual, self.state))
-        self._slope = compat.compile_form(slope)
-        self._mixed = compat.compile_form(sum(ufl.derivative(a * d, self.state, v) for a, d in along))
-        self._curvature = compat.compile_form(curvature)
-        self._volume = compat.compile_form(J * air)
-        self._matrix = fem.petsc.create_matrix(self._tangent)
-        self._vector = fem.petsc.create_vector(self._residual)
+            terms.append(Term(self.medium.density(F, second, mu), self.cells(tags.GAP)))
+        self._potential = Potential(self, terms)
+        t = ufl.TestFunction(compat.cell_vectors(self.mesh, 6))
+        slopes = [(ufl.diff(term.density, q), term.measure) for term in terms]
+        along = [(ufl.inner(slope, self._direction), d) for slope, d in slopes]
+        self._slope = [compile_form(ufl.inner(slope, t) * d) for slope, d in slopes]
+        self._mixed = [compile_form(ufl.derivative(w * d, self.state, self.test)) for w, d in along]
+        self._curvature = [compile_form(ufl.inner(ufl.diff(w, q), t) * d) for w, d in along]
+        self._volume = [compile_form(J * air)]
+        self._matrix = self.create_matrix()
 
     def _reduce(self, rollers):
         """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p
@@ -161,9 +153,9 @@ class CellProblem:
         ):
             first = _same_modulo(coordinates, pitch)
             master[dofs] = dofs[first]
-        solid = self.cell_tags.indices[~np.isin(self.cell_tags.values, (AIR, GAP))]
+        solid = self.cell_tags.indices[~np.isin(self.cell_tags.values, (tags.AIR, tags.GAP))]
         used = np.zeros(n, bool)
-        there = self.cell_tags.indices[(self.cell_tags.values != GAP) | (self.medium is not None)]
+        there = self.cell_tags.indices[(self.cell_tags.values != tags.GAP) | (self.medium is not None)]
         used[self.displacement_dofs[compat.cell_dofs(self.displacement_space)[there]]] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True
         held = np.zeros(n, bool)
@@ -216,63 +208,56 @@ class CellProblem:
         """State array of the mixed space from the unknowns (unknowns,)."""
         return np.where(self.reduced >= 0, values[self.reduced], 0.0)
 
-    def displacement(self, array=None):
-        """(nodes, 3) displacement u in mm of the P2 nodes."""
-        return (self.state.x.array if array is None else array)[self.displacement_dofs]
-
-    def _vector_of(self, form):
-        with self._vector.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(self._vector, form)
+    def _unknowns_of(self, forms):
+        """(unknowns,) sum of linear forms."""
         keep = self.reduced >= 0
-        return np.bincount(self.reduced[keep], self._vector.array[keep], minlength=self.unknowns)
+        return np.bincount(self.reduced[keep], self.vector(forms)[keep], minlength=self.unknowns)
 
-    def residual(self):
+    def _strains_of(self, forms):
+        """(6,) integrals of forms with one component for each of (e, k)."""
+        return sum(fem.assemble_vector(form).array.reshape(-1, 6).sum(axis=0) for form in forms)
+
+    def residual(self) -> tuple[np.ndarray, np.ndarray]:
         """(dPi/du,p (unknowns,), dPi/d(e,k) (6,)) at the current state, strains and pressure."""
-        forces, slope = self._vector_of(self._residual), self._sums_of(self._slope)
-        if self.contact:
-            pushing, screwing = self.contact.residual()
-            forces, slope = forces + pushing, slope + screwing
-        return forces, slope
+        forces, slope = self._unknowns_of(self._potential.residuals), self._strains_of(self._slope)
+        pushing = self.contact.residual()
+        return forces + pushing[:-6], slope + pushing[-6:]
 
-    def _sums_of(self, form):
-        """(6,) integrals of a form with one component for each of (e, k)."""
-        return fem.assemble_vector(form).array.reshape(-1, 6).sum(axis=0)
-
-    def tangent(self):
+    def tangent(self) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
         """(bordered matrix as CSR, d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6))."""
-        self._matrix.zeroEntries()
-        fem.petsc.assemble_matrix(self._matrix, self._tangent)
-        self._matrix.assemble()
-        _, _, data = self._matrix.getValuesCSR()
+        self.assemble(self._matrix, self._potential.tangents)
         if self._bordered is None:
             self._bordered = _BorderedPattern(self._matrix, self.reduced, self.gauge)
-        touching, pushed, screwed = self.contact.tangent() if self.contact else ((), 0.0, 0.0)
-        matrix, n = self._bordered.filled(data, *touching), self.unknowns
+        _, _, data = self._matrix.getValuesCSR()
+        n, touching = self.unknowns, self.contact.tangent()
+        inner = touching[:n, :n].tocoo()
+        matrix = self._bordered.filled(data, inner.row, inner.col, inner.data)
         mixed, curvature = np.empty((n, 6)), np.empty((6, 6))
         for i in range(6):
             self._direction.value[:] = np.eye(6)[i]
-            mixed[:, i], curvature[:, i] = self._vector_of(self._mixed), self._sums_of(self._curvature)
-        return matrix, mixed + pushed, curvature + screwed
+            mixed[:, i], curvature[:, i] = self._unknowns_of(self._mixed), self._strains_of(self._curvature)
+        return matrix, mixed + touching[:n, n:].toarray(), curvature + touching[n:, n:].toarray()
 
-    def contact_forces(self):
+    def medium_forces(self) -> np.ndarray:
         """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their
         X1."""
-        with self._vector.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(self._vector, self._contact)
-        return -self._vector.array[self.displacement_dofs]
+        return -self.vector(self._potential.residuals[-1:])[self.displacement_dofs]
 
-    def measure_contact(self):
-        """hifi.contact.walls.WallContact of the gap with the largest force; None without contact."""
+    def measure_contact(self) -> WallContact | None:
+        """That of the gap with the largest force, at the last residual; None without contact."""
         pressure = float(self.pressure.value)
-        if self.contact:
+        if self._penalty:
             return self.contact.measure(pressure)
         return self.walls.contact(pressure) if self.medium else None
 
-    def air_volume(self):
+    def air_volume(self) -> float:
         """Volume (mm3) of the air in one pitch."""
-        return float(fem.assemble_scalar(self._volume))
+        return self.integral(self._volume)
+
+    def stored_energy(self) -> float:
+        """N mm in one pitch: all of the potential but the air's -P V. Along free states its change is the
+        integral of P dV."""
+        return self._potential.stored_energy() + self.contact.energy()
 
 
 class _BorderedPattern:

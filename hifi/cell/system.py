@@ -108,7 +108,7 @@ class CellSystem:
     def state(self, x):
         self._x = x
         n = self.problem.unknowns
-        self.problem.state.x.array[:] = self.problem.expand(x[:n])
+        self.problem.array[:] = self.problem.expand(x[:n])
         self.problem.strains.value[:] = x[n + 6 :]
 
     @property
@@ -179,17 +179,11 @@ class CellSystem:
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
         self.influence = self._solver.solve_many(self._mixed)
         self.condensed = self._curvature - self._mixed.T @ self.influence
-        self._update = ContactUpdate(
-            self.problem.contact.stiffnesses(factorised=True) if self.problem.contact else {}
-        )
+        self._update = ContactUpdate(self.problem.contact.stiffnesses(factorised=True))
 
     def renew(self):
         """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
-        return (
-            self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve)
-            if self.problem.contact
-            else False
-        )
+        return self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve)
 
     def _gap_gradients(self, points):
         rows, n = self.problem.contact.gradients(points), self.problem.unknowns
@@ -224,7 +218,7 @@ class CellSystem:
 
     @property
     def overreach(self):
-        return self.problem.contact.overreach if self.problem.contact else 0.0
+        return self.problem.contact.overreach
 
     @property
     def factorisations(self):
@@ -265,7 +259,7 @@ class CellSystem:
             self.walls.distance(),
             self.problem.segment.gap if self.walls.gaps else np.inf,
             self.problem.measure_contact(),
-            self.problem.state.x.array.copy(),
+            self.problem.array.copy(),
         )
 
     def _release(self):

@@ -7,32 +7,31 @@ too (base.left_jacobian).
 """
 
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
+from mpi4py import MPI
 
 from pneunet.base.left_jacobian import LeftJacobian
-from pneunet.hifi.contact.penalty import DEEPEST, mean_normal, touching
-from pneunet.hifi.contact.walls import IN_CONTACT, WallContact, distances_from
+from pneunet.hifi.contact.gaps import Contact, Side
+from pneunet.hifi.contact.penalty import WallPenalty, mean_normal, touching
+from pneunet.hifi.contact.walls import IN_CONTACT, CellWalls, WallContact, distances_from
 from pneunet.hifi.fem import surface
-from pneunet.hifi.path.low_rank import TouchingSides
+from pneunet.hifi.fem.mixed_field import MixedField
 
 #: strains (e, k) from twists (k, e)
 _ORDER = [3, 4, 5, 0, 1, 2]
 
 
-class CellContact:
-    """Contact in the gaps of `walls` (hifi.contact.walls.CellWalls) under a
-    hifi.contact.penalty.WallPenalty."""
+class CellContact(Contact):
+    """Contact in the gaps of `walls` under a penalty; unknowns are the problem's and the six strains
+    (e, k)."""
 
-    def __init__(self, problem, walls, penalty):
-        self.problem, segment = problem, problem.segment
-        self.law = penalty.on(segment.material.mu, segment.gap)
-        self._sides, self._sides_in_touch = [], TouchingSides()
-        #: deepest overlap at the last residual, over DEEPEST of the gap; 0 where nothing comes closer than
-        #: the penalty's onset
-        self.overreach = 0.0
+    def __init__(self, problem: MixedField, walls: CellWalls, penalty: WallPenalty):
+        size = problem.unknowns + 6
+        super().__init__(MPI.COMM_SELF, size, slice(0, size))
+        self.problem, self.gaps = problem, len(walls.gaps)
+        self.law = penalty.on(problem.segment.material.mu, problem.segment.gap)
+        self._walls = []
         for gap in walls.gaps:
             rest = [problem.nodes[f] + np.multiply.outer(s, [[1, 0, 0]]) for f, s in gap]
             middle = np.mean([r[..., 0].mean() for r in rest])
@@ -42,64 +41,25 @@ class CellContact:
                 for f, s in gap
             ]
             normal /= np.linalg.norm(normal)
-            self._sides += [(sheets, normal), (sheets[::-1], -normal)]
+            self._walls += [(sheets, normal), (sheets[::-1], -normal)]
 
-    def _touching(self):
-        """[_Side] of all sides in touch."""
+    def sides(self) -> list[Side]:
         problem, found = self.problem, []
         y = problem.nodes * [0, 1, 1] + problem.displacement()
         e, k = np.split(problem.strains.value, 2)
-        for number, (sheets, direction) in enumerate(self._sides):
+        for number, (sheets, direction) in enumerate(self._walls):
             places = [sheet.positions(y, np.concatenate([k, e])) for sheet in sheets]
             t = touching(places[0], sheets[0].areas, places[1], direction, self.law)
             if t is not None:
-                found.append(_Side(problem, number, t, sheets, places))
+                found.append(_Side(problem, number, self.law, t, sheets, places))
         return found
 
-    def energy(self):
-        """N mm stored in the walls' overlaps."""
-        return float(sum((t.touching.area * t.touching.energy).sum() for t in self._touching()))
-
-    def residual(self):
-        """(unknowns,) and (6,): how the energy changes with the problem's unknowns and strains (e, k)."""
-        forces = np.zeros(self.problem.unknowns + 6)
-        self._sides_in_touch.now, deepest = self._touching(), 0.0
-        for side in self._sides_in_touch.now:
-            deepest = max(deepest, side.touching.overlap.max() + self.law.onset)
-            np.add.at(forces, side.columns[side.kept], side.first_derivatives()[side.kept])
-        self.overreach = deepest / (DEEPEST * self.problem.segment.gap)
-        return forces[:-6], forces[-6:]
-
-    def tangent(self):
-        """((rows, columns, values) in the unknowns, (unknowns, 6), (6, 6)): second derivatives of the
-        energy."""
-        n, self._sides_in_touch.then = self.problem.unknowns, self._touching()
-        total = sp.csr_matrix((n + 6, n + 6))
-        for side in self._sides_in_touch.then:
-            gradient = side.gap_gradients
-            total = (
-                total
-                + side.bend()
-                + gradient.T @ sp.diags(side.touching.area * side.touching.slope) @ gradient
-            )
-        inner = total[:n, :n].tocoo()
-        return (inner.row, inner.col, inner.data), total[:n, n:].toarray(), total[n:, n:].toarray()
-
-    def stiffnesses(self, factorised=False):
-        """{point: N/mm} at the last residual, or at the last tangent."""
-        return self._sides_in_touch.stiffnesses(factorised)
-
-    def gradients(self, points):
-        """(m, unknowns + 6): how the gaps of points change with unknowns and strains."""
-        return self._sides_in_touch.gap_gradients(points, self.problem.unknowns + 6).toarray()
-
-    def measure(self, pressure):
-        """WallContact of the gap with the largest force, `pressure` (MPa) being that of the air."""
-        gaps = [WallContact() for _ in range(len(self._sides) // 2)]
-        totals = np.zeros((len(gaps), 3))
-        for side in self._touching():
+    def measure(self, pressure: float) -> WallContact:
+        """WallContact at the last residual of the gap with the largest force, `pressure` (MPa) being that of
+        the air."""
+        gaps = [WallContact() for _ in range(self.gaps)]
+        for side in self._now:
             t, gap = side.touching, side.number // 2
-            totals[gap] += (-1) ** side.number * (t.area * t.pressure) @ t.normal
             pushing = t.pressure > IN_CONTACT * pressure
             if pushing.any():
                 d = distances_from(side.places[1], t.position[pushing])
@@ -110,7 +70,7 @@ class CellContact:
                     np.fmin(c.nearest, d.min()),
                     np.fmax(c.farthest, d.max()),
                 )
-        forces = np.linalg.norm(totals, axis=1)
+        forces = np.linalg.norm(self.forces(), axis=1)
         return replace(gaps[forces.argmax()], force=float(forces.max()))
 
 
@@ -128,21 +88,18 @@ class _Sheet:
         return np.einsum("...ij,...j->...i", pose[..., :3, :3], y[self.facets]) + pose[..., :3, 3]
 
 
-class _Side:
-    """One side of a gap in touch: the chain from positions x to the cell's unknowns and strains."""
+class _Side(Side):
+    """Its columns (n, 42) are the nodes' unknowns, and behind all unknowns the strains' twist (k, e)."""
 
-    def __init__(self, problem, number, t, sheets, places):
-        self.number, self.touching, self.places, self.unknowns = number, t, places, problem.unknowns
+    def __init__(self, problem, number, law, t, sheets, places):
         own, other = sheets
         nodes = np.concatenate([own.facets[t.facet], other.facets[t.other]], axis=1)
         self.s = np.concatenate([own.s[t.facet], other.s[t.other]], axis=1)
         self.x = np.concatenate([places[0][t.facet], places[1][t.other]], axis=1)
         columns = problem.reduced[problem.displacement_dofs[nodes]].reshape(len(nodes), 36)
         strains = np.broadcast_to(problem.unknowns + np.array(_ORDER), (len(nodes), 6))
-        #: (n, 42) places of the nodes' unknowns, -1 where held, and of the strains' twist (k, e) behind all
-        #: unknowns
-        self.columns = np.hstack([columns, strains])
-        self.kept = self.columns >= 0
+        super().__init__(number, law, t, np.hstack([columns, strains]), problem.unknowns + 6)
+        self.places = places
         e, k = np.split(problem.strains.value, 2)
         self._jacobian = LeftJacobian(self.s.reshape(-1, 1) * np.concatenate([k, e]))
         #: twists (n, 12, 6, 6) by the strains' twist (k, e)
@@ -154,17 +111,11 @@ class _Side:
         spin, shift = self._rates[..., :3, :], self._rates[..., 3:, :]
         return np.cross(spin, self.x[..., None], axisa=-2, axisb=-2, axisc=-2) + shift
 
-    def first_derivatives(self):
-        """(n, 42) of the energy."""
-        return self._chained(self.touching.forces)
-
-    def _chained(self, by_position):
-        """(n, 42) derivatives by unknowns and twist from those by positions (n, 12, 3)."""
+    def chained(self, by_position: np.ndarray) -> np.ndarray:
         local = np.einsum("...ji,...j->...i", self.rotation, by_position).reshape(len(by_position), 36)
         return np.hstack([local, np.einsum("cnis,cni->cs", self._motion(), by_position)])
 
-    def bend(self):
-        """Sparse (unknowns + 6, same): second derivatives of the energy at fixed pressures."""
+    def bend(self) -> np.ndarray:
         t, D, pairs = self.touching, self._motion(), len(self.s)
         f, H = t.forces, -t.push[:, None, None] * t.bend
         HD = (H @ D.reshape(pairs, 36, 6)).reshape(pairs, 12, 3, 6)
@@ -184,21 +135,6 @@ class _Side:
         )
         by_place = np.cross(D, f[..., None], axisa=-2, axisb=-2, axisc=-2)  # d(x x f)
         own += np.einsum("cais,cait->cst", self._rates[..., :3, :], by_place)
-        whole = np.concatenate(
+        return np.concatenate(
             [np.concatenate([local, coupling], 2), np.concatenate([np.swapaxes(coupling, 1, 2), own], 2)], 1
         )
-        both = self.kept[:, :, None] & self.kept[:, None, :]
-        places = [
-            np.broadcast_to(c, both.shape)[both] for c in (self.columns[:, :, None], self.columns[:, None, :])
-        ]
-        return sp.coo_matrix((whole[both], places), shape=(self.unknowns + 6,) * 2).tocsr()
-
-    @cached_property
-    def gap_gradients(self):
-        """Sparse (points, unknowns + 6): first derivatives of the gaps."""
-        t, kept = self.touching, self.kept
-        points = np.broadcast_to(t.point[:, None], kept.shape)[kept]
-        values = self._chained(t.gradient)[kept]
-        return sp.coo_matrix(
-            (values, (points, self.columns[kept])), shape=(len(t.area), self.unknowns + 6)
-        ).tocsr()

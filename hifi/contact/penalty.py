@@ -46,15 +46,17 @@ class WallPenalty:
 
     def on(self, mu, gap):
         """The law of a gap (mm) in a body of shear modulus mu (MPa)."""
-        return PenaltyLaw(self.stiffness * mu / gap, self.onset * gap)
+        return PenaltyLaw(self.stiffness * mu / gap, self.onset * gap, gap)
 
 
 @dataclass(frozen=True)
 class PenaltyLaw:
-    """stiffness in MPa/mm; onset in mm: from -onset to onset of overlap the pressure is a parabola."""
+    """stiffness in MPa/mm; onset in mm: from -onset to onset of overlap the pressure is a parabola; gap at
+    rest in mm."""
 
     stiffness: float
     onset: float
+    gap: float
 
     def __call__(self, overlap):
         """(energy per area, pressure, its slope) of overlaps (n,) in mm; N/mm, MPa and MPa/mm."""
@@ -94,10 +96,6 @@ class Touching:
     def push(self):
         """(c,) N: minus the derivative of the energy by the gap, for each pair."""
         return (self.area * self.pressure)[self.point]
-
-    def stiffnesses(self, side):
-        """{(side, facet, Gauss point): N/mm}, in the order of the points."""
-        return {(side, *name): value for name, value in zip(self.name.tolist(), self.area * self.slope)}
 
     @property
     def forces(self):

@@ -3,13 +3,13 @@
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry import tags
 from pneunet.hifi.contact.walls import CellWalls, distances_from
 from pneunet.hifi.fem import surface
 
 PITCHES = 3
 DIVISIONS = 3
-KPA = 1e3
 
 
 def draw_cell(problem, state, path, pitches=PITCHES):
@@ -22,7 +22,7 @@ def draw_cell(problem, state, path, pitches=PITCHES):
     from pneunet.base.pictures.walls import FIELD, TOUCHING, draw_walls
 
     kept = problem.strains.value.copy()
-    problem.strains.value[:] = np.concatenate([state.strains.e, state.strains.k])
+    problem.strains.value[:] = state.strains.vector
     try:
         distances = node_distances(CellWalls(problem), state.array)
     finally:
@@ -51,7 +51,7 @@ def draw_cell(problem, state, path, pitches=PITCHES):
         if state.walls_overlap
         else f"walls {state.wall_distance:.3f} mm apart"
     )
-    title = f"{state.pressure * KPA:.4g} kPa, {'' if contact else 'no '}contact: {told}"
+    title = f"{state.pressure * KPA_PER_MPA:.4g} kPa, {'' if contact else 'no '}contact: {told}"
     draw_walls(path, body, lines, walls, gap, title, TOUCHING * gap if contact else 0.0)
     return True
 
@@ -71,7 +71,7 @@ def _positions(problem, state, facets, shift):
     """(rest, deformed) positions (facets, 6, 3) in mm of the facets of the pitch that lies `shift` mm further
     along the body."""
     X = problem.nodes[facets] + [shift, 0, 0]
-    screw = se3.exp_pose(np.concatenate([state.strains.k, state.strains.e]) * X[..., :1])
+    screw = se3.exp_pose(state.strains.twist_vector * X[..., :1])
     local = X * [0, 1, 1] + problem.displacement(state.array)[facets]
     return X, np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
 

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pneunet.base.files.schemas import MARKS
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.path.stepping import lagrange_coefficients
-
-KPA = 1e3  # kPa per MPa
-#: columns by which every table of a manipulator marks its rows, 0 or 1
-MARKS = ("walls_overlap", "body_overlap")
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,7 @@ class Load:
     def __str__(self):
         if self.pressure == 0 and self.dead_loads > 0:
             return f"{100 * self.dead_loads:.3g} % of the dead loads"
-        return f"{self.pressure * KPA:.2f} kPa"
+        return f"{self.pressure * KPA_PER_MPA:.2f} kPa"
 
 
 @dataclass(frozen=True)
@@ -95,9 +93,9 @@ class Touch:
         return {
             "contact": self.contact,
             **self.marks,
-            "first_touch_kPa": self.walls_from and self.walls_from.pressure * KPA,
+            "first_touch_kPa": self.walls_from and self.walls_from.pressure * KPA_PER_MPA,
             "first_touch_dead_load_fraction": self.walls_from and self.walls_from.dead_loads,
-            "first_body_touch_kPa": self.body_from and self.body_from.pressure * KPA,
+            "first_body_touch_kPa": self.body_from and self.body_from.pressure * KPA_PER_MPA,
             "first_body_touch_dead_load_fraction": self.body_from and self.body_from.dead_loads,
         }
 

@@ -150,7 +150,7 @@ class CellWalls:
         e, k = np.split(self.problem.strains.value, 2)
         s = self.problem.nodes[facets][..., :1] + shift[:, None, None]
         rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
-        forces = np.einsum("...ij,...j->...i", rotation, self.problem.contact_forces()[facets]).reshape(-1, 3)
+        forces = np.einsum("...ij,...j->...i", rotation, self.problem.medium_forces()[facets]).reshape(-1, 3)
         # a node of a cut lies on both sides of it, with a share of the force on each
         _, first, inverse = np.unique(
             np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True

@@ -27,6 +27,7 @@ _FLAGS = [
 #: timeout in s: another run may be compiling the same form into the same cache just now
 COMPILER = {"cffi_extra_compile_args": _FLAGS, "timeout": 60}
 VERSION = dolfinx.__version__
+MeshTags = dolfinx.mesh.MeshTagsMetaClass if OLD else dolfinx.mesh.MeshTags
 
 
 @contextmanager

@@ -1,14 +1,39 @@
-"""Loads: each is an object with its residual term; what a path sets is their `value`."""
+"""Loads: each is an object with its residual; what a path sets are its `value`."""
 
 import numpy as np
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-PRESSURE_DEGREE = 4
+from pneunet.hifi.fem.materials import Materials, groups
+from pneunet.hifi.fem.mixed_field import MixedField
+from pneunet.hifi.fem.surface import FaceQuadrature
 
 
-class Pressure:
+class Load:
+    """`value` times what the load is.
+
+    has_tangent: whether its residual's derivative belongs to the tangent; closed: whether that is symmetric.
+    """
+
+    has_tangent = False
+    closed = True
+
+    def on(self, field: MixedField) -> list[ufl.Form]:
+        """Residual (N, tested with field.test), in parts; called once by the problem on which it acts."""
+        self.value = fem.Constant(field.mesh, PETSc.ScalarType(0.0))
+        v, _ = ufl.split(field.test)
+        return [self.value * part for part in self.parts(field, v)]
+
+    def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
+        """Residual at value = 1, tested with the displacement v."""
+        raise NotImplementedError
+
+    def update(self, field: MixedField) -> None:
+        """Told before the residual is assembled."""
+
+
+class Pressure(Load):
     """Follower pressure `value` (MPa) on tagged facets: -P V, so P inner(J inv(F).T N, v) in the residual.
 
     closed: the facets close a cavity, so that the load's tangent is symmetric; an open loaded patch has
@@ -17,62 +42,32 @@ class Pressure:
 
     has_tangent = True
 
-    def __init__(self, tags, closed=True):
+    def __init__(self, tags: tuple[int, ...], closed: bool = True):
         self.tags, self.closed = tuple(tags), closed
 
-    def term(self, problem, u, v):
-        """Residual form (N, tested with v); called once by the problem this load acts on."""
-        mesh = problem.mesh
-        self.value = fem.Constant(mesh, PETSc.ScalarType(0.0))
-        ds = ufl.Measure(
-            "ds",
-            domain=mesh,
-            subdomain_data=problem.facet_tags,
-            metadata={"quadrature_degree": PRESSURE_DEGREE},
-        )
-        F = ufl.Identity(3) + ufl.grad(u)
-        area = ufl.det(F) * ufl.inv(F).T * ufl.FacetNormal(mesh)
-        self.volume_form = -ufl.inner(ufl.SpatialCoordinate(mesh) + u, area) / 3 * ds(self.tags)
-        return self.value * ufl.inner(area, v) * ds(self.tags)
-
-    def update(self, problem):
-        pass
+    def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
+        ds, F = field.facets(*self.tags), ufl.Identity(3) + ufl.grad(field.u)
+        area = ufl.det(F) * ufl.inv(F).T * ufl.FacetNormal(field.mesh)
+        self.volume_form = -ufl.inner(ufl.SpatialCoordinate(field.mesh) + field.u, area) / 3 * ds
+        return [ufl.inner(area, v) * ds]
 
 
-class Gravity:
+class Gravity(Load):
     """Weight: `value` times the acceleration (3,) in mm/s^2 on materials {cell tag: law with a density, or
     one law}."""
 
-    has_tangent = False
-    closed = True
-
-    def __init__(self, materials, acceleration):
+    def __init__(self, materials: Materials, acceleration: tuple[float, float, float]):
         self.materials, self.acceleration = materials, np.asarray(acceleration, float)
 
-    def term(self, problem, u, v):
-        mesh = problem.mesh
-        self.value = fem.Constant(mesh, PETSc.ScalarType(0.0))
-        dx = ufl.Measure(
-            "dx", domain=mesh, subdomain_data=problem.cell_tags, metadata={"quadrature_degree": 2}
-        )
-        groups = {}
-        if isinstance(self.materials, dict):
-            for tag, material in self.materials.items():
-                groups.setdefault(material.density, []).append(tag)
-            parts = [(density, dx(tuple(tags))) for density, tags in groups.items()]
-        else:
-            parts = [(self.materials.density, dx)]
-        g = ufl.as_vector([fem.Constant(mesh, PETSc.ScalarType(a)) for a in self.acceleration])
-        return sum(
-            -self.value * fem.Constant(mesh, PETSc.ScalarType(density)) * ufl.inner(g, v) * d
-            for density, d in parts
-        )
-
-    def update(self, problem):
-        pass
+    def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
+        parts = []
+        for density, tags in groups(self.materials, lambda material: material.density).items():
+            weight = fem.Constant(field.mesh, PETSc.ScalarType(-density * self.acceleration))
+            parts.append(ufl.inner(weight, v) * field.cells(*tags, degree=2))
+        return parts
 
 
-class EndLoad:
+class EndLoad(Load):
     """Dead force (3,) in N and moment (3,) in N mm, fixed in space, on a tagged face, times `value`.
 
     The traction force/A + w x (x - c), c the face's centre and w such that it has exactly this moment about
@@ -80,32 +75,24 @@ class EndLoad:
     left out, Newton finds the equilibrium all the same.
     """
 
-    has_tangent = False
-    closed = True
-
-    def __init__(self, tag, force=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0)):
+    def __init__(
+        self,
+        tag: int,
+        force: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        moment: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ):
         self.tag, self.force, self.moment = tag, np.asarray(force, float), np.asarray(moment, float)
 
-    def term(self, problem, u, v):
-        from pneunet.hifi.fem.surface import FaceQuadrature
-
-        mesh = problem.mesh
-        self.value = fem.Constant(mesh, PETSc.ScalarType(0.0))
-        self._face = FaceQuadrature(problem, self.tag)
+    def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
+        self._face = FaceQuadrature(field, self.tag)
         self._even, self._spin, self._centre = (
-            fem.Constant(mesh, PETSc.ScalarType(np.zeros(3))) for _ in range(3)
+            fem.Constant(field.mesh, PETSc.ScalarType(np.zeros(3))) for _ in range(3)
         )
-        ds = ufl.Measure(
-            "ds",
-            domain=mesh,
-            subdomain_data=problem.facet_tags,
-            metadata={"quadrature_degree": PRESSURE_DEGREE},
-        )
-        x = ufl.SpatialCoordinate(mesh) + u
+        x = ufl.SpatialCoordinate(field.mesh) + field.u
         traction = self._even + ufl.cross(self._spin, x - self._centre)
-        return -self.value * ufl.inner(traction, v) * ds(self.tag)
+        return [-ufl.inner(traction, v) * field.facets(self.tag)]
 
-    def update(self, problem):
+    def update(self, field: MixedField) -> None:
         """Refer the traction to the face's present centre and second moments."""
-        traction = self._face.traction(problem.nodes + problem.displacement(), self.force, self.moment)
+        traction = self._face.traction(field.nodes + field.displacement(), self.force, self.moment)
         self._even.value[:], self._spin.value[:], self._centre.value[:] = traction

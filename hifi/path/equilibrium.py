@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.fem.solver import NotConverged, PredictorTooFar
 from pneunet.hifi.path.newton import Newton
 from pneunet.hifi.path.stepping import lagrange_coefficients
@@ -31,6 +32,16 @@ class LimitPoint:
     load: float
     volume: float
     kind: str
+
+    @property
+    def text(self) -> str:
+        """In words, of a path whose load is a pressure."""
+        pressure = f"{self.load * KPA_PER_MPA:.4g} kPa ({self.kind})"
+        return f"limit point: pressure {pressure} at volume {self.volume:.4g} mm3"
+
+    def table(self) -> dict[str, float | str]:
+        """The same for run.json."""
+        return {"pressure_kPa": self.load * KPA_PER_MPA, "volume_mm3": self.volume, "kind": self.kind}
 
 
 def limit_point(three):

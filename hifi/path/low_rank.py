@@ -6,43 +6,9 @@ serves until the next one.
 """
 
 import numpy as np
-import scipy.sparse as sp
 
 #: of the largest stiffness of a point: smaller changes are left to the iterations
 SMALLEST = 0.02
-
-
-class TouchingSides:
-    """The sides of gaps that push at the last residual (`now`) and at the last tangent (`then`), of a cell or
-    of a body's rank.
-
-    A side has a number, a hifi.contact.penalty.Touching and gap_gradients, sparse (points, n).
-    """
-
-    def __init__(self):
-        self.now, self.then = [], []
-
-    def stiffnesses(self, factorised=False):
-        """{point: N/mm} at the last residual, or at the last tangent."""
-        sides = self.then if factorised else self.now
-        return {
-            point: value for side in sides for point, value in side.touching.stiffnesses(side.number).items()
-        }
-
-    def gap_gradients(self, points, n):
-        """Sparse (m, n): how the gaps of points change; zero for those that push at no side here."""
-        places, rows = {p: i for i, p in enumerate(points)}, {}
-        for side in [*self.now, *self.then]:  # what is taken away was put in as it was then
-            chosen = [
-                (places[p], row)
-                for row, p in enumerate(side.touching.stiffnesses(side.number))
-                if p in places
-            ]
-            if chosen:
-                to, of = np.array(chosen).T
-                rows |= dict(zip(to.tolist(), side.gap_gradients[of]))
-        nothing = sp.csr_matrix((1, n))
-        return sp.vstack([rows.get(i, nothing) for i in range(len(points))]).tocsr()
 
 
 class ContactUpdate:

@@ -6,6 +6,7 @@ import json
 import sys
 import traceback
 from pathlib import Path
+from typing import Any
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import write_text
@@ -22,7 +23,7 @@ FUNCTIONS = {
 DONE, STOPPED, REFUSED, ERROR, MEMORY = "done", "stopped", "refused", "error", "out of memory"
 
 
-def answer(function, inputs, directory):
+def answer(function: str, inputs: dict[str, Any], directory: Path) -> dict[str, Any]:
     """{"status", "reason", "result"} of `function` (see FUNCTIONS) called with (inputs, directory)."""
     try:
         module, name = FUNCTIONS.get(function, function).split(":")
@@ -38,7 +39,7 @@ def answer(function, inputs, directory):
         return {"status": short, "reason": f"{type(error).__name__}: {error}", "result": None}
 
 
-def main(directory):
+def main(directory: str | Path) -> None:
     show_on_screen()  # into the case's log.txt
     directory = Path(directory)
     case = json.loads((directory / "case.json").read_text())

@@ -11,6 +11,7 @@ stops nothing. Ranks get cases from mpi4py.futures; its manager takes rank 0.
 import fcntl
 import hashlib
 import json
+import logging
 import os
 import shutil
 import signal
@@ -18,10 +19,12 @@ import socket
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
@@ -32,6 +35,8 @@ from pneunet.base.system.processes import Limits, environment_without_launcher, 
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.runs.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
 from pneunet.hifi.runs.jit_cache import own_cache
+
+log = logging.getLogger(__name__)
 
 OUT_OF_TIME, CRASHED = "out of time", "crashed"
 #: ways to end that are the case's own answer: doing it again would give the same
@@ -53,25 +58,24 @@ class Case:
     """
 
     function: str
-    inputs: dict
+    inputs: dict[str, Any]
     label: str = ""
 
     @cached_property
-    def name(self):
+    def name(self) -> str:
         """The folder's name: changed inputs are another case."""
         text = json.dumps([self.function, self.inputs], sort_keys=True, default=float)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def run_cases(
-    cases,
-    directory,
-    limits=None,
-    comm=MPI.COMM_WORLD,
-    say=print,
-    on_record=lambda case, record: None,
-    retry=False,
-):
+    cases: Sequence[Case],
+    directory: str | Path,
+    limits: Limits | None = None,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    on_record: Callable[[Case, dict], object] = lambda case, record: None,
+    retry: bool = False,
+) -> list[dict[str, Any]]:
     """Run what is not finished of `cases` in directory/NAME; collective. Returns the records, in order, on
     rank 0, else [].
 
@@ -83,18 +87,17 @@ def run_cases(
     nothing. InputError, on all ranks, when the folder is not to be had.
     """
     directory = Path(directory)
-    say = say if comm.rank == 0 else (lambda text: None)
     limits = _with_memory(limits or Limits(), comm)
     records, failure = {}, None
     with _locked(comm, directory):
-        todo = on_rank_0(comm, lambda: _unfinished(cases, directory, retry, records, on_record, say))
+        todo = on_rank_0(comm, lambda: _unfinished(cases, directory, retry, records, on_record))
         work = partial(
             run_case,
             directory=directory,
             limits=limits,
             version=comm.bcast(revision() if comm.rank == 0 else None),
         )
-        progress = _Progress(len(todo), say)
+        progress = _Progress(len(todo))
 
         def take(finished):
             for case, record in finished:
@@ -128,7 +131,9 @@ def _distribute(work, todo, comm, take):
                 raise
 
 
-def run_case(case, directory, limits, version="unknown"):
+def run_case(
+    case: Case, directory: Path, limits: Limits, version: str = "unknown"
+) -> tuple[Case, dict[str, Any]]:
     """(case, record) of one case, run in a child process; directory/NAME is there, complete, when it
     returns."""
     started = time.time()
@@ -203,7 +208,7 @@ def _how_it_failed(ended, limits, log):
     return {"status": CRASHED, "reason": f"ended by {how}" + (f": {telling[0][:200]}" if telling else "")}
 
 
-def finished(case, directory):
+def finished(case: Case, directory: str | Path) -> dict[str, Any] | None:
     """The record of a case that is on disk in directory/NAME, None when it is not finished."""
     try:
         return json.loads((Path(directory) / case.name / RECORD).read_text())
@@ -211,7 +216,7 @@ def finished(case, directory):
         return None
 
 
-def _unfinished(cases, directory, retry, records, on_record, say):
+def _unfinished(cases, directory, retry, records, on_record):
     """The cases to compute, each once; those on disk go to `records`."""
     for left in directory.glob(".*-*"):
         shutil.rmtree(left, ignore_errors=True)  # half a case of a run that was killed
@@ -224,10 +229,10 @@ def _unfinished(cases, directory, retry, records, on_record, say):
     if records:
         failed = sum(record["status"] not in ANSWERS for record in records.values())
         again = f", {failed} of them failed (--retry computes those again)" if failed else ""
-        say(f"{len(records)} of {len(distinct)} cases are finished in {directory}{again}")
+        log.info(f"{len(records)} of {len(distinct)} cases are finished in {directory}{again}")
         others = {record["revision"] for record in records.values()} - {revision()}
         if others:
-            say(f"note: some were computed by another version of the code ({', '.join(sorted(others))})")
+            log.info(f"note: some were computed by another version of the code ({', '.join(sorted(others))})")
     return [case for name, case in distinct.items() if name not in records]
 
 
@@ -270,15 +275,15 @@ def _locked(comm, directory):
 class _Progress:
     """One line a case, with the time that is left at the pace so far."""
 
-    def __init__(self, total, say):
-        self.total, self.say, self.done, self.started = total, say, 0, time.monotonic()
+    def __init__(self, total):
+        self.total, self.done, self.started = total, 0, time.monotonic()
 
     def tell(self, case, record):
         self.done += 1
         left = (time.monotonic() - self.started) / self.done * (self.total - self.done)
         memory = f", {record['peak_memory_MB']:.0f} MB" if record["peak_memory_MB"] else ""
         reason = f": {record['reason']}" if record["reason"] else ""
-        self.say(
+        log.info(
             f"{self.done:{len(str(self.total))}d}/{self.total}  {case.label or case.name}: {record['status']}"
             f" in {record['seconds']:.1f} s{memory}{reason}; ETA {left:.0f} s"
         )

@@ -9,12 +9,13 @@ import fcntl
 import itertools
 import os
 import socket
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 
 @contextmanager
-def own_cache():
+def own_cache() -> Iterator[Path]:
     """A folder for XDG_CACHE_HOME, the first of $XDG_CACHE_HOME/pneunet/HOST-0, HOST-1, ... that nobody uses;
     ours within the block.
 
@@ -35,7 +36,7 @@ def own_cache():
             return
 
 
-def remove_unfinished(folder):
+def remove_unfinished(folder: Path) -> None:
     """Remove the modules that ffcx began (NAME.c) and did not finish (NAME.c.cached)."""
     for source in (folder / "fenics").glob("libffcx_*.c"):
         if not source.with_suffix(".c.cached").exists():

@@ -8,7 +8,7 @@ halved.
 import numpy as np
 from scipy.integrate import simpson
 
-from pneunet.geometry.designfile import read_design
+from pneunet.geometry.designfile import read_design_file
 from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.verification import reference_case
 
@@ -18,7 +18,7 @@ PRESSURE = 0.02
 def balance(intervals=8):
     """([(intervals, work of the pressure / stored energy - 1), coarsest rule first], dofs) of the shipped
     two-segment body."""
-    design = read_design(reference_case.DATA / "reference.toml")
+    design = read_design_file(reference_case.DATA / "reference.toml")
     solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
     pressures = np.linspace(0.0, PRESSURE, intervals + 1)
     volume = {0.0: solve.problem.cavity_volume()}

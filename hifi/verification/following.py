@@ -7,7 +7,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.hifi.body.problem import MixedProblem
+from pneunet.hifi.body.problem import BodyProblem
 from pneunet.hifi.body.system import BodySystem
 from pneunet.hifi.path.control import LoadControl
 from pneunet.hifi.path.equilibrium import EquilibriumPath
@@ -32,9 +32,9 @@ class Comparison:
         return abs(self.computed / self.reference - 1)
 
 
-def body_system(mesh, supports, loads, material=None, spacing=None, body_force=None):
+def body_system(mesh, supports, loads, material=None, spacing=None):
     """BodySystem (neo-Hookean with mu = 1 MPa by default) whose load is the common value of all `loads`."""
-    problem = MixedProblem(*mesh, material or NeoHookean(1.0), supports, loads, body_force)
+    problem = BodyProblem(*mesh, material or NeoHookean(1.0), supports, loads)
 
     def apply(value):
         for load in loads:

@@ -6,8 +6,10 @@ follower pressure.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import ufl
+from ufl.core.expr import Expr
 
 from pneunet.hifi.body.problem import Support
 from pneunet.hifi.fem.loads import Pressure
@@ -28,15 +30,13 @@ class Fibres:
     bt: float = 2.0
     bfs: float = 4.0
     bulk_compliance: float = 0.0
-    law = "exponential, fibres along x"
-    parameters = ("C", "bf", "bt", "bfs")
+    constants: ClassVar = ("C", "bf", "bt", "bfs")
 
-    @staticmethod
-    def energy(c, F):
+    def energy_of(self, F: Expr) -> Expr:
         E = (F.T * F - ufl.Identity(3)) / 2
         across = E[1, 1] ** 2 + E[2, 2] ** 2 + 2 * E[1, 2] ** 2
-        Q = c["bf"] * E[0, 0] ** 2 + c["bt"] * across + 2 * c["bfs"] * (E[0, 1] ** 2 + E[0, 2] ** 2)
-        return c["C"] / 2 * (ufl.exp(Q) - 1)
+        Q = self.bf * E[0, 0] ** 2 + self.bt * across + 2 * self.bfs * (E[0, 1] ** 2 + E[0, 2] ** 2)
+        return self.C / 2 * (ufl.exp(Q) - 1)
 
 
 def beam(cells):

@@ -8,11 +8,11 @@ displacement but for x = 1, where the traction P N acts.
 
 import numpy as np
 import ufl
-from dolfinx import fem
-from petsc4py import PETSc
 
 from pneunet.hifi.body.problem import Support
 from pneunet.hifi.fem import compat
+from pneunet.hifi.fem.loads import Load
+from pneunet.hifi.fem.mixed_field import MixedField
 from pneunet.hifi.verification import bodies
 from pneunet.hifi.verification.following import body_system, solve_from
 
@@ -37,27 +37,18 @@ def exact(X):
     return u, F, q, q + ufl.inner(F, F) / 3
 
 
-class Traction:
-    """Exact traction on the face x = 1."""
+class Exact(Load):
+    """The force in the body and the traction on its face x = 1 that the exact deformation needs."""
 
-    has_tangent, closed = False, True
-
-    def term(self, problem, u, v):
-        self.value = fem.Constant(problem.mesh, PETSc.ScalarType(0.0))
-        _, F, q, _ = exact(ufl.SpatialCoordinate(problem.mesh))
-        N = ufl.FacetNormal(problem.mesh)
-        ds = ufl.Measure(
-            "ds", domain=problem.mesh, subdomain_data=problem.facet_tags, metadata={"quadrature_degree": 6}
-        )
-        return -self.value * ufl.inner(F * N + q * ufl.inv(F).T * N, v) * ds(bodies.END)
-
-    def update(self, problem):
-        pass
-
-
-def body_force(X):
-    u, F, q, _ = exact(X)
-    return -(ufl.div(ufl.grad(u)) + ufl.inv(F).T * ufl.grad(q))
+    def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
+        X, N = ufl.SpatialCoordinate(field.mesh), ufl.FacetNormal(field.mesh)
+        u, F, q, _ = exact(X)
+        force = ufl.div(ufl.grad(u)) + ufl.inv(F).T * ufl.grad(q)
+        traction = F * N + q * ufl.inv(F).T * N
+        return [
+            ufl.inner(force, v) * field.cells(),
+            -ufl.inner(traction, v) * field.facets(bodies.END, degree=6),
+        ]
 
 
 def motion(X, load=1.0):
@@ -69,18 +60,14 @@ def errors(cells):
     interpolant."""
     faces = (bodies.PLANE_X, bodies.PLANE_Y, bodies.END_Y, bodies.PLANE_Z, bodies.END_Z)
     mesh = bodies.box((1.0, 1.0, 1.0), (cells,) * 3)
-    system = body_system(
-        mesh, [Support(tag, None, motion) for tag in faces], [Traction()], body_force=body_force
-    )
+    system = body_system(mesh, [Support(tag, None, motion) for tag in faces], [Exact()])
     problem = system.problem
     solve_from(system, 1.0, motion, lambda X: shifted_pressure(X.T, np.sin, np.cos))
-    u, p = ufl.split(problem.state)
     u_exact, _, _, p_exact = exact(ufl.SpatialCoordinate(problem.mesh))
-    dx = ufl.Measure("dx", domain=problem.mesh, metadata={"quadrature_degree": 6})
     found = []
-    for difference in (u - u_exact, p - p_exact):
-        square = fem.assemble_scalar(compat.compile_form(ufl.inner(difference, difference) * dx))
-        found.append(float(np.sqrt(problem.mesh.comm.allreduce(square))))
+    for difference in (problem.u - u_exact, problem.p - p_exact):
+        square = compat.compile_form(ufl.inner(difference, difference) * problem.cells(degree=6))
+        found.append(float(np.sqrt(problem.integral([square]))))
     dofs = problem.dofs
     system.destroy()
     return *found, dofs

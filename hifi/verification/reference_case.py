@@ -14,11 +14,11 @@ DATA = Path(__file__).resolve().parent / "data"
 
 def numbers():
     """{name: number} of the converged state at 20 kPa; the same on all ranks."""
-    from pneunet.geometry.designfile import read_design
+    from pneunet.geometry.designfile import read_design_file
     from pneunet.hifi.body.manipulator import ManipulatorSolve
     from pneunet.hifi.path.newton import NewtonOptions
 
-    design = read_design(DATA / "reference.toml")
+    design = read_design_file(DATA / "reference.toml")
     # two decades below what is compared
     options = NewtonOptions(relative_tolerance=1e-11)
     solve = ManipulatorSolve(design.manipulator, DATA / "reference.msh", newton_options=options)

@@ -6,16 +6,20 @@ tube here is turned like a segment: tau > 0 for chambers of less than 90 degrees
 with the slant.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
 from pneunet.base.errors import ConvergenceError
+from pneunet.geometry.parameters import Segment
 from pneunet.reduced.analytic.equilibrium import states
 from pneunet.reduced.analytic.helical import HelicalCell
 from pneunet.reduced.analytic.twisting import TubePotential, TwistingTube
 
+Floats = Sequence[float] | np.ndarray
 #: where the search for the best tube begins: E_t/mu and Ri/Ro
 MODULI, RATIOS = np.geomspace(0.03, 30, 10), np.linspace(0.2, 0.9, 8)
 
@@ -45,7 +49,7 @@ class Calibration:
     stretch_error: float
 
 
-def tube_curves(tube, angles, pressures):
+def tube_curves(tube: TwistingTube, angles: Floats, pressures: Floats) -> TwistCurves:
     """TwistCurves of a tube: nan beyond its limit load."""
     tau, stretch = np.full((2, len(angles), len(pressures)), np.nan)
     for i, angle in enumerate(angles):
@@ -57,7 +61,7 @@ def tube_curves(tube, angles, pressures):
     return TwistCurves(np.asarray(angles, float), np.asarray(pressures, float), tau, stretch)
 
 
-def calibrate_tube(curves, start, radii=True):
+def calibrate_tube(curves: TwistCurves, start: TwistingTube, radii: bool = True) -> Calibration:
     """The Calibration of the tube nearest to `curves`; `start` gives mu, fractions, fibre convention and,
     without `radii`, those.
 
@@ -87,30 +91,31 @@ def calibrate_tube(curves, start, radii=True):
         found = candidate(x)
         return np.inf if found is None else found.tau_error**2 + found.stretch_error**2
 
-    grid = (
-        [np.array([m, r]) for m in np.log(MODULI) for r in RATIOS]
-        if radii
-        else np.log(np.geomspace(*MODULI[[0, -1]], 30))[:, None]
-    )
+    moduli = np.log(MODULI) if radii else np.linspace(np.log(MODULI[0]), np.log(MODULI[-1]), 30)
+    grid = [np.array(x) for x in product(moduli, *([RATIOS] if radii else []))]
     best = minimize(
         cost, min(grid, key=cost), method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-8, "maxfev": 150}
     )
     return candidate(best.x)
 
 
-def softened_curvature(segment, pressures, softness, slant=0.0):
+def softened_curvature(
+    segment: Segment, pressures: Floats, softness: float, slant: float = 0.0
+) -> np.ndarray:
     """|k| (n,) in 1/mm of the one-sided cell at `softness` sin(angle)^-slant times the pressures (n,) in MPa;
     nan: no state."""
     cell, curvature = HelicalCell(segment), np.full(len(pressures), np.nan)
     try:
         for j, x in enumerate(states(cell, softness * segment.sin**-slant * np.asarray(pressures))):
-            curvature[j] = np.linalg.norm(cell.rod_strains(x[None])[1])
+            curvature[j] = np.linalg.norm(cell.rod_strains(x[None]).k)
     except ConvergenceError:
         pass
     return curvature
 
 
-def calibrate_softness(segments, pressures, curvature, slanted=True):
+def calibrate_softness(
+    segments: Sequence[Segment], pressures: Floats, curvature: np.ndarray, slanted: bool = True
+) -> tuple[float, float]:
     """(softness, slant) for which `softened_curvature` is nearest to `curvature` (segments, pressures), in
     1/mm.
 

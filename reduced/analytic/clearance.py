@@ -10,13 +10,15 @@ also open as the segment bends. It is a design rule; only the FE says whether wa
 
 import numpy as np
 
+from pneunet.geometry.parameters import Segment
+
 #: Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, Table 35 (nu = 0.3), times 12 (1 - nu^2)
 SIDE_RATIOS = np.array([1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 1e9])
 ALPHA = np.array([0.00126, 0.00172, 0.00207, 0.00230, 0.00245, 0.00254, 0.00260]) * 12 * 0.91
 MEMBRANE = 30.0
 
 
-def wall_bulge(segment, pressure):
+def wall_bulge(segment: Segment, pressure: float) -> float:
     """Central deflection (mm) of one chamber wall at `pressure` (MPa)."""
     height, length = segment.chamber_height, segment.cavity_width / segment.sin
     short, long = min(height, length), max(height, length)
@@ -29,6 +31,6 @@ def wall_bulge(segment, pressure):
     return float(x * t)
 
 
-def gap_left(segment, pressure):
+def gap_left(segment: Segment, pressure: float) -> float:
     """Estimated distance (mm) left between facing walls; negative where they are expected to touch."""
     return segment.gap - 2 * wall_bulge(segment, pressure)

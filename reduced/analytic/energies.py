@@ -1,13 +1,16 @@
 """Energies of thin walls and volumes, with exact first and second derivatives.
 
-Each law takes rows of arguments (n, m) and returns value (n,), gradient (n, m) and Hessian (n, m, m).
+Each density takes rows of arguments (n, m) and returns its Derivatives.
 Energies are of the incompressible neo-Hookean solid in plane stress, per volume and in units of mu/2.
 """
 
 import numpy as np
 
+#: value (n,), gradient (n, m) and Hessian (n, m, m)
+Derivatives = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-def membrane(a):
+
+def membrane(a: np.ndarray) -> Derivatives:
     """Core strip under the in-plane deformation gradient a = (F11, F21, F12, F22): F:F + 1/det(F)^2 - 3."""
     f11, f21, f12, f22 = a.T
     det = f11 * f22 - f12 * f21
@@ -19,7 +22,7 @@ def membrane(a):
     return value, gradient, 2 * np.eye(4) - (2 * det**-3)[:, None, None] * dd_det + bend
 
 
-def panel(a):
+def panel(a: np.ndarray) -> Derivatives:
     """Wall stretched to the vector (a1, a2) along one edge and by a3 along the other, without shear.
 
     g2 + a3^2 + 1/(g2 a3^2) - 3 with g2 = a1^2 + a2^2.
@@ -43,7 +46,7 @@ def panel(a):
     return g2 + h2 + f - 3, by_g[:, None] * d_g + by_h[:, None] * d_h, hessian
 
 
-def bulged_wall(a):
+def bulged_wall(a: np.ndarray) -> Derivatives:
     """Wall stretched by a1 and a2 along its edges and bulging out of its plane with slopes a3 and a4 along
     them.
 
@@ -67,7 +70,7 @@ def bulged_wall(a):
     return value, 2 * a - d_det / det[:, None] ** 2, hessian
 
 
-def product(a):
+def product(a: np.ndarray) -> Derivatives:
     """a1 a2 a3: a volume element."""
     a1, a2, a3 = a.T
     zero = np.zeros_like(a1)

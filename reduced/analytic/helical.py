@@ -8,17 +8,22 @@ The paper's own model stood in its lost supplement; this one is ours, derived in
 Rod strains of the channel axis: e = (M11, M12, 0), k = (-K12, K11, 0).
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base.errors import InputError
-from pneunet.geometry.parameters import ONE_SIDED
-from pneunet.reduced.analytic.energies import bulged_wall, membrane, panel, product
+from pneunet.base.strains import RodStrains
+from pneunet.geometry.parameters import ONE_SIDED, Segment
+from pneunet.reduced.analytic.energies import Derivatives, bulged_wall, membrane, panel, product
 from pneunet.reduced.analytic.equilibrium import follow
 from pneunet.reduced.analytic.kinematics import INDEX, SIZE, CellKinematics, along_shapes, wall_shapes
 
 GAUSS_POINTS, ALONG_POINTS = 4, 5
+#: (energy density, rows of its arguments by the unknowns, weights in mm^3)
+Term = tuple[Callable[[np.ndarray], Derivatives], np.ndarray, np.ndarray]
 
 
 _rule = lru_cache(np.polynomial.legendre.leggauss)
@@ -34,13 +39,13 @@ def _gauss(low, high, n=GAUSS_POINTS):
 class HelicalCell:
     """Potential energy of one cell of a one-sided Segment; `strains` follows its minimum from P = 0.
 
-    Every argument of a law (reduced/analytic/energies.py) is linear in the unknowns, `rows @ x`: gradient and
-    Hessian are exact.
+    Every argument of a density (reduced/analytic/energies.py) is linear in the unknowns, `rows @ x`: gradient
+    and Hessian are exact.
     """
 
     name = "one-sided cell"
 
-    def __init__(self, segment):
+    def __init__(self, segment: Segment) -> None:
         if segment.kind != ONE_SIDED:
             raise InputError(f"kind = '{segment.kind}': the helical model is for 'one-sided' segments")
         if segment.cavity_top <= segment.core_top:
@@ -57,12 +62,12 @@ class HelicalCell:
         # half of the chamber; the other half is its image
         y, self.along_weights = _gauss(0.0, 1.0, ALONG_POINTS)
         self.along = along_shapes(y)  # (derivative, shape, points)
-        self.walls = (
+        self.walls: tuple[Term, ...] = (
             (membrane, *self._core()),
             (panel, *self._walls()),
             (bulged_wall, *self._long_walls()),
         )
-        self.gas = (product, *self._gas())
+        self.gas: Term = (product, *self._gas())
         self.small = self._small_strains()
 
     # terms of the energy: rows of arguments and weights (mm^3)
@@ -75,7 +80,7 @@ class HelicalCell:
             layers = [
                 *(
                     [(s.core_bottom, s.layer_top, s.width * s.layer_material.mu / self.mu)]
-                    if s.layer_thickness
+                    if s.layer_material
                     else []
                 ),
                 (s.layer_top, -half, s.width),
@@ -214,38 +219,37 @@ class HelicalCell:
 
     # potential
 
-    def admissible(self, x):
-        return (x[[INDEX["M11"], INDEX["M22"], INDEX["height"]]] > 0.2).all()
+    def admissible(self, x: np.ndarray) -> bool:
+        """Whether nothing is squeezed to a fifth."""
+        return bool((x[[INDEX["M11"], INDEX["M22"], INDEX["height"]]] > 0.2).all())
 
-    def energy(self, x):
+    def energy(self, x: np.ndarray) -> Derivatives:
         """Elastic energy of one pitch in N mm, its gradient and Hessian in the unknowns."""
         value, gradient, hessian = 0.5 * x @ self.small @ x, self.small @ x, self.small
         for term in self.walls:
-            v, g, h = _assemble(*term, x)
+            v, g, h = _assemble(term, x)
             value, gradient, hessian = value + v, gradient + g, hessian + h
         return self.mu / 2 * value, self.mu / 2 * gradient, self.mu / 2 * hessian
 
-    def volume(self, x):
+    def volume(self, x: np.ndarray) -> Derivatives:
         """Cavity volume of one pitch in mm^3, its gradient and Hessian."""
-        return _assemble(*self.gas, x)
+        return _assemble(self.gas, x)
 
-    def strains(self, pressures):
-        """e and k, each (n, 3), at increasing pressures (n,) in MPa; ConvergenceError at a limit load."""
+    def strains(self, pressures: ArrayLike) -> RodStrains:
+        """RodStrains (n, 3) at increasing pressures (n,) in MPa; ConvergenceError at a limit load."""
         return self.rod_strains(follow(self, pressures))
 
-    def rod_strains(self, x):
-        """e and k, each (n, 3), of unknowns (n, SIZE)."""
-        e, k = np.zeros((2, len(x), 3))
-        e[:, 0], e[:, 1] = x[:, INDEX["M11"]], x[:, INDEX["M12"]]
-        k[:, 0], k[:, 1] = (
-            -x[:, INDEX["K12"]] / self.cell.core_height,
-            x[:, INDEX["K11"]] / self.cell.core_height,
-        )
-        return e, k
+    def rod_strains(self, x: np.ndarray) -> RodStrains:
+        """RodStrains (n, 3) of unknowns (n, SIZE)."""
+        q = np.zeros((len(x), 6))
+        q[:, [0, 1]] = x[:, [INDEX["M11"], INDEX["M12"]]]
+        q[:, [3, 4]] = x[:, [INDEX["K12"], INDEX["K11"]]] / self.cell.core_height * [-1, 1]
+        return RodStrains.of_vector(q)
 
 
-def _assemble(law, rows, weights, x):
-    value, gradient, hessian = law(rows @ x)
+def _assemble(term: Term, x: np.ndarray) -> Derivatives:
+    density, rows, weights = term
+    value, gradient, hessian = density(rows @ x)
     flat = rows.reshape(-1, SIZE)
     weighted = (weights[:, None, None] * hessian) @ rows
     return weights @ value, (weights[:, None] * gradient).ravel() @ flat, flat.T @ weighted.reshape(-1, SIZE)

@@ -7,6 +7,9 @@ their feet and held by the top wall. See docs/theory-reduced.md.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from pneunet.geometry.parameters import Segment
 
 #: Unknowns of the section and of the chamber; the latter vary along the chamber with `along_shapes`. All are
 #: of order 1: K, beta and delta are multiplied by the core's height.
@@ -17,7 +20,7 @@ INDEX = {name: i for i, name in enumerate(UNKNOWNS)}
 SIZE = len(UNKNOWNS)
 
 
-def along_shapes(y):
+def along_shapes(y: np.ndarray) -> np.ndarray:
     """Shapes of y = -1..1 along the chamber, with two derivatives: (derivative, shape, points).
 
     The value at the ends, the excess in the middle (1 - y^2)^2, and y^2 (1 - y^2), which has a slope at the
@@ -34,7 +37,7 @@ def along_shapes(y):
     )
 
 
-def wall_shapes(x):
+def wall_shapes(x: np.ndarray) -> np.ndarray:
     """Long wall's profiles of x = 0..1 from foot to top, with two derivatives: (derivative, profile, points).
 
     Hermite cubics (displacement and slope at the foot, displacement and slope at the top) and the bulge 16
@@ -57,7 +60,7 @@ class CellKinematics:
     derivatives, and rows depend on (n, m). "Opening" and "sliding" are per cavity thickness: 1 and 0 at rest.
     """
 
-    def __init__(self, segment):
+    def __init__(self, segment: Segment) -> None:
         s = self.segment = segment
         self.core_height = s.core_top - s.core_bottom
         self.xi = s.sin * np.array([1.0, -s.cot])
@@ -70,27 +73,27 @@ class CellKinematics:
         self.wall_height = s.cavity_top + s.top_wall / 2 - self.foot  # free height, to the top wall's middle
         self.end = along_shapes(np.ones(1))
 
-    def start(self):
+    def start(self) -> np.ndarray:
         """The unknowns at rest (SIZE,)."""
         x = np.zeros(SIZE)
         for name in ("M11", "M22", "height", "top_end"):
             x[INDEX[name]] = 1.0
         return x
 
-    def section(self, name):
+    def section(self, name: str) -> np.ndarray:
         """The unknown itself (SIZE,)."""
         row = np.zeros(SIZE)
         row[INDEX[name]] = 1.0
         return row
 
-    def chamber(self, name, shapes):
+    def chamber(self, name: str, shapes: np.ndarray) -> np.ndarray:
         """A chamber's unknown at the stations (m, SIZE)."""
         rows = np.zeros((shapes.shape[1], SIZE))
         first = INDEX[name + "_end"]
         rows[:, first : first + 3] = shapes.T
         return rows
 
-    def gradient(self, z, shapes, part):
+    def gradient(self, z: ArrayLike, shapes: np.ndarray, part: float) -> np.ndarray:
         """F = A(z) + `part` of opening and sliding, in axes (xi, eta): rows (n, m, 4, SIZE) of F11, F21, F12,
         F22."""
         Z = np.asarray(z, float)[:, None] / self.core_height
@@ -102,37 +105,37 @@ class CellKinematics:
         out[..., 1, INDEX["delta"]] += part * Z * shapes[0]
         return out
 
-    def along_eta(self, z):
+    def along_eta(self, z: ArrayLike) -> np.ndarray:
         """Stretch of eta (n, SIZE), the same at every station and on both sides of a cavity's edge."""
         return self.gradient(z, self.end[0], 0.0)[:, 0, 3]
 
-    def shear(self, z):
+    def shear(self, z: ArrayLike) -> np.ndarray:
         """eta's tilt towards xi (n, SIZE): A(z)'s own shear."""
         return self.gradient(z, self.end[0], 0.0)[:, 0, 2]
 
-    def plane_sliding(self, z):
+    def plane_sliding(self, z: ArrayLike) -> np.ndarray:
         """Sliding of the cavity's far side along eta by the core under it (n, SIZE)."""
         return self.gradient(z, self.end[0], 1 - self.share)[:, 0, 1]
 
-    def sliding(self, z):
+    def sliding(self, z: np.ndarray) -> np.ndarray:
         """Sliding at heights z: above the foot linear up to the top wall's, as the long walls shear in their
         planes."""
         x = ((z - self.foot) / self.wall_height)[:, None]
         free = (1 - x) * self.plane_sliding([self.foot]) + x * self.section("slide")
         return np.where(x > 0, free, self.plane_sliding(z))
 
-    def plane_opening(self, z, shapes):
+    def plane_opening(self, z: ArrayLike, shapes: np.ndarray) -> np.ndarray:
         """Stretch of the cavity across itself by the core under it."""
         return self.gradient(z, shapes, 1 - self.share)[..., 0, :]
 
-    def wall_amplitudes(self, shapes):
+    def wall_amplitudes(self, shapes: np.ndarray) -> np.ndarray:
         """Coefficients of `wall_shapes` in units of the cavity's stretch: (profile, m, SIZE)."""
         foot, above = self.plane_opening([self.foot, self.foot + self.wall_height], shapes)
         return np.stack(
             [foot, above - foot] + [self.chamber(name, shapes) for name in ("top", "corner", "bulge")]
         )
 
-    def opening(self, z, shapes):
+    def opening(self, z: np.ndarray, shapes: np.ndarray) -> np.ndarray:
         """Stretch of the cavity across itself at heights z."""
         x = (z - self.foot) / self.wall_height
         free = np.tensordot(wall_shapes(x)[0], self.wall_amplitudes(shapes), axes=(0, 0))

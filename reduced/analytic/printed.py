@@ -1,17 +1,19 @@
 """The paper's twisting equations as printed (Eqs 5-21), and what its printed constants give.
 
-`/usr/bin/python3 -m reduced.analytic.printed` prints both. The equations have no solution: with uniform
+`python -m pneunet.reduced.analytic.printed` prints both. The equations have no solution: with uniform
 lambda_psi = lambda_z^-1/2 and a constant multiplier the three conditions contradict one another, and without
 c1 mu lambda_psi^2 in Eq. 11 not even P = 0 leaves the tube at rest. The consistent form is
 reduced/analytic/twisting.py.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.reduced.analytic import twisting
 from pneunet.reduced.analytic.twisting import GAUSS_POINTS, TwistingTube
 
@@ -24,11 +26,11 @@ class PrintedResult:
     Ri^3."""
 
     solved: bool
-    unknowns: dict
+    unknowns: dict[str, float]
     residual: np.ndarray
     starts: int
 
-    def __str__(self):
+    def __str__(self) -> str:
         state = ", ".join(f"{k} = {v:.4g}" for k, v in self.unknowns.items())
         head = (
             "solution"
@@ -38,7 +40,9 @@ class PrintedResult:
         return f"{head}: |residual| = {np.linalg.norm(self.residual):.3g} at {state}"
 
 
-def printed_residual(tube, angle, pressure, tau, stretch, multiplier):
+def printed_residual(
+    tube: TwistingTube, angle: float, pressure: float, tau: float, stretch: float, multiplier: float
+) -> np.ndarray:
     """Eqs 19-21 as printed (3,): lambda_psi = lambda_z^-1/2, Eq. 11 without c1 mu lambda_psi^2, cos on the
     hoop.
 
@@ -67,7 +71,9 @@ def printed_residual(tube, angle, pressure, tau, stretch, multiplier):
     )
 
 
-def printed_equations(tube, angle, pressure, multiplier="unknown", seed=0):
+def printed_equations(
+    tube: TwistingTube, angle: float, pressure: float, multiplier: str = "unknown", seed: int = 0
+) -> PrintedResult:
     """Try to solve the paper's printed Eqs 5-21 and report; pressure > 0 in MPa, angle in degrees.
 
     multiplier: 'unknown' takes the letter P in Eqs 10-12 for the constant multiplier p, one of the paper's
@@ -103,7 +109,9 @@ def printed_equations(tube, angle, pressure, multiplier="unknown", seed=0):
     return PrintedResult(solved, dict(zip(names, best.x.tolist())), best.fun, len(starts))
 
 
-def largest_twist(tube, angles=range(30, 90, 5), step=1e-3, highest=0.2):
+def largest_twist(
+    tube: TwistingTube, angles: Iterable[float] = range(30, 90, 5), step: float = 1e-3, highest: float = 0.2
+) -> tuple[float, float, float]:
     """(tau, angle, pressure) of the largest |tau| that the consistent form reaches below its limit load,
     rad/mm."""
     best = (0.0, 0.0, 0.0)
@@ -113,19 +121,17 @@ def largest_twist(tube, angles=range(30, 90, 5), step=1e-3, highest=0.2):
                 tau = tube.solve(angle, pressure)[2]
             except ConvergenceError:
                 break
-            best = max(best, (abs(tau), float(angle), float(pressure)))
+            best = max(best, (float(np.abs(tau)), float(angle), float(pressure)))
     return best
 
 
-def main():
+def main() -> None:
     for fibre_modulus in (twisting.PAPER_FIBRE_MODULUS, 100 * twisting.PAPER_FIBRE_MODULUS):
         tube = TwistingTube(3.0, 7.0, twisting.PAPER_MU, fibre_modulus)
         tau, angle, pressure = largest_twist(tube, range(30, 90, 10), 2e-3)
         print(f"Ri = 3 mm, Ro = 7 mm, mu = {tube.mu} MPa, E_t = {fibre_modulus:g} MPa")
-        print(
-            f"  consistent form: largest |tau| {tau:.5f} rad/mm (angle {angle:g} deg, {pressure * 1e3:.0f}"
-            " kPa)"
-        )
+        kPa = f"{pressure * KPA_PER_MPA:.0f} kPa"
+        print(f"  consistent form: largest |tau| {tau:.5f} rad/mm (angle {angle:g} deg, {kPa})")
         for multiplier in MULTIPLIERS:
             result = printed_equations(tube, 60.0, 0.02, multiplier)
             print(f"  printed equations, 60 deg, 20 kPa, P in Eqs 10-12 = {multiplier}: {result}")

@@ -11,13 +11,18 @@ per undeformed length. The paper's own form, which has no solution, is in reduce
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base.errors import InputError
+from pneunet.reduced.analytic.energies import Derivatives
 from pneunet.reduced.analytic.equilibrium import follow
 
 #: Components of the fibre A(angle) on the axis Z and the hoop Psi. `axial`: the text below Eq. 3, angle
 #: measured from the axis, which is what a chamber does; `hoop`: Eqs 11-12, cos on the hoop direction.
-FIBRE_CONVENTIONS = {"axial": (np.cos, np.sin), "hoop": (np.sin, np.cos)}
+FIBRE_CONVENTIONS: dict[str, tuple[np.ufunc, np.ufunc]] = {
+    "axial": (np.cos, np.sin),
+    "hoop": (np.sin, np.cos),
+}
 
 #: The paper's constants for its twisting theory: Eq. 2, below Eq. 1, Sec. III.
 PAPER_MU, PAPER_FIBRE_MODULUS, PAPER_ISOTROPIC_FRACTION, PAPER_ANISOTROPIC_FRACTION = 0.317, 0.008, 0.27, 0.73
@@ -41,7 +46,7 @@ class TwistingTube:
     anisotropic_fraction: float = PAPER_ANISOTROPIC_FRACTION
     fibre_convention: str = "axial"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 0 < self.inner_radius < self.outer_radius:
             raise InputError(
                 f"inner_radius = {self.inner_radius:g} must lie between 0 and outer_radius ="
@@ -55,7 +60,7 @@ class TwistingTube:
                 f"fibre_convention = '{self.fibre_convention}' is not known: write 'axial' or 'hoop'"
             )
 
-    def solve(self, angle, pressure):
+    def solve(self, angle: float, pressure: float | ArrayLike) -> tuple[float | np.ndarray, ...]:
         """(ri, lambda_z, tau): inner radius in mm, stretch, rad per mm of deformed length; each shaped as
         pressure.
 
@@ -77,7 +82,7 @@ class TubePotential:
     name = "twisting tube"
     start = np.array([1.0, 1.0, 0.0])
 
-    def __init__(self, tube, angle):
+    def __init__(self, tube: TwistingTube, angle: float) -> None:
         self.tube = tube
         on_axis, on_hoop = FIBRE_CONVENTIONS[tube.fibre_convention]
         self.axial, self.hoop = on_axis(np.radians(angle)), on_hoop(np.radians(angle))
@@ -87,10 +92,12 @@ class TubePotential:
         self.weights = np.pi * (Ro - Ri) * weights * self.R
         self.scale = tube.mu * np.pi * (Ro**2 - Ri**2)
 
-    def admissible(self, x):
-        return x[0] > 0.1 and x[1] > 0.1
+    def admissible(self, x: np.ndarray) -> bool:
+        """Whether nothing is squeezed to a tenth."""
+        return bool((x[:2] > 0.1).all())
 
-    def volume(self, x):
+    def volume(self, x: np.ndarray) -> Derivatives:
+        """pi ri^2 lambda and its derivatives."""
         a, lz, _ = x
         c = np.pi * self.tube.inner_radius**2
         return (
@@ -99,7 +106,7 @@ class TubePotential:
             c * np.array([[2 * lz, 2 * a, 0], [2 * a, 0, 0], [0, 0, 0]]),
         )
 
-    def energy(self, x):
+    def energy(self, x: np.ndarray) -> Derivatives:
         """Value, gradient (3,) and Hessian (3, 3): by (rho = r^2, lambda, k) first, with rho of (a,
         lambda)."""
         t, R2 = self.tube, self.R**2

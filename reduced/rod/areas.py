@@ -3,8 +3,10 @@ different, so the areas of the twisting tube are the volumes of one cell divided
 
 import numpy as np
 
+from pneunet.geometry.parameters import Segment
 
-def empty_area(segment):
+
+def empty_area(segment: Segment) -> float:
     """Mean area of channel and cavities, mm^2."""
     share = segment.cavity_thickness / segment.sin / segment.pitch
     overlap = segment.channel_width * (segment.channel_height / 2 - segment.cavity_floor)
@@ -12,7 +14,7 @@ def empty_area(segment):
     return segment.channel_width * segment.channel_height + len(segment.sides) * cavity
 
 
-def occupied_area(segment):
+def occupied_area(segment: Segment) -> float:
     """Mean area of the solid, mm^2: core and chamber blocks less what is empty."""
     core = segment.width * (segment.core_top - segment.core_bottom)
     share = segment.chamber_thickness / segment.sin / segment.pitch
@@ -20,7 +22,7 @@ def occupied_area(segment):
     return core + blocks - empty_area(segment)
 
 
-def equivalent_radii(segment):
+def equivalent_radii(segment: Segment) -> tuple[float, float]:
     """(Ri, Ro) in mm of the tube with the same empty and the same occupied area (paper, Sec. II.A.1).
 
     The paper shows one cross-section; for slanted chambers we take the areas' mean over a pitch.
@@ -29,7 +31,7 @@ def equivalent_radii(segment):
     return float(np.sqrt(empty / np.pi)), float(np.sqrt((empty + occupied_area(segment)) / np.pi))
 
 
-def active_mass(segment):
+def active_mass(segment: Segment) -> tuple[float, float]:
     """(mass per undeformed length in tonne/mm, z of its centre in mm) of chambers and core, averaged over a
     pitch."""
     s = segment
@@ -47,7 +49,7 @@ def active_mass(segment):
     return _mass(parts)
 
 
-def passive_mass(segment):
+def passive_mass(segment: Segment) -> tuple[float, float]:
     """The same of the bare core with its channel."""
     return _mass(_core(segment))
 
@@ -58,7 +60,7 @@ def _core(s):
         (s.width * density, s.core_bottom, s.core_top),
         (-s.channel_width * density, -s.channel_height / 2, s.channel_height / 2),
     ]
-    if s.layer_thickness:
+    if s.layer_material:
         parts.append((s.width * (s.layer_material.density - density), s.core_bottom, s.layer_top))
     return parts
 

@@ -9,6 +9,7 @@ the next piece.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base import se3
 from pneunet.base.errors import InputError
@@ -27,34 +28,34 @@ class Centreline:
     poses: np.ndarray
 
     @property
-    def points(self):
+    def points(self) -> np.ndarray:
         """(n, 3) origins of the section frames, mm."""
         return self.poses[:, :3, 3]
 
     @property
-    def strains(self):
+    def strains(self) -> RodStrains:
         """RodStrains of the n-1 intervals between samples."""
         relative = se3.inverse_pose(self.poses[:-1]) @ self.poses[1:]
         return RodStrains.from_relative_pose(relative, np.diff(self.s))
 
     @property
-    def tangents(self):
+    def tangents(self) -> np.ndarray:
         """(n, 3) unit tangents of the line of origins; at a joint that of the piece which begins there."""
         e = self.strains.e[self._interval(self.s)]
         tangents = (self.poses[:, :3, :3] @ e[:, :, None])[:, :, 0]
         return tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
 
     @property
-    def arc_length(self):
+    def arc_length(self) -> np.ndarray:
         """(n,) deformed arc length at the samples, mm."""
         return np.concatenate([[0.0], np.cumsum(self.strains.stretch * np.diff(self.s))])
 
     @property
-    def length(self):
+    def length(self) -> float:
         """Deformed length, mm."""
         return self.arc_length[-1]
 
-    def at(self, s):
+    def at(self, s: ArrayLike) -> np.ndarray:
         """Section frames (n, 4, 4) at any undeformed arc lengths s (n,) in mm on the rod: exact, not
         interpolated."""
         s = np.asarray(s, float)
@@ -68,7 +69,9 @@ class Centreline:
         return np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
 
 
-def centreline(lengths, strains, spacing=1.0, base_pose=None):
+def centreline(
+    lengths: ArrayLike, strains: RodStrains, spacing: float = 1.0, base_pose: np.ndarray | None = None
+) -> Centreline:
     """The Centreline of pieces in a row.
 
     lengths : (m,) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (m, 3). spacing :
@@ -99,7 +102,9 @@ def centreline(lengths, strains, spacing=1.0, base_pose=None):
     return Centreline(s, poses)
 
 
-def free_shapes(lengths, strains, samples=20, base_pose=None):
+def free_shapes(
+    lengths: ArrayLike, strains: RodStrains, samples: int = 20, base_pose: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(s (n, m samples + 1) in mm, poses (n, m samples + 1, 4, 4)) of n designs at once, of m pieces each.
 
     lengths : (n, m) undeformed lengths, mm, > 0. strains : RodStrains with e, k of shape (n, m, 3). samples :

@@ -7,13 +7,21 @@ change dx moves all behind it by the spatial twist A_i dx_i, A_i = h Ad(g_{i-1})
 tridiagonal: the step for x is found through them with one banded factorisation.
 """
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
+from numpy.typing import ArrayLike
 from scipy.linalg import LinAlgError, cholesky_banded
 from scipy.linalg.lapack import dgbsv
 
 from pneunet.base import se3
 from pneunet.base.left_jacobian import LeftJacobian, adjoint, wrench_commutator
+from pneunet.reduced.rod.laws import SectionLaw
+
+if TYPE_CHECKING:
+    from pneunet.reduced.rod.rod import RodPiece
 
 #: e and k of a law's strains in the order of a twist, and back
 TWIST_ORDER = np.array([3, 4, 5, 0, 1, 2])
@@ -24,39 +32,37 @@ class NodalLoads:
     """Dead loads at the nodes 1..n, fixed in space: forces (n, 3) in N; spreads (n, 3, 3), the sum of r (x) f
     over the forces f that act at points r (mm) of a node's section frame; moments (n, 3) in N mm."""
 
-    def __init__(self, count):
+    def __init__(self, count: int) -> None:
         self.forces, self.spreads, self.moments = (
             np.zeros((count, 3)),
             np.zeros((count, 3, 3)),
             np.zeros((count, 3)),
         )
 
-    def add(self, node, force, point=(0.0, 0.0, 0.0)):
+    def add(self, node: int | slice, force: np.ndarray, point: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """Forces (m, 3) at points (m, 3) of the frames of distinct nodes (m,)."""
         self.forces[node] += force
         self.spreads[node] += np.einsum("...i,...j->...ij", np.asarray(point, float), force)
 
     @property
-    def conservative(self):
+    def conservative(self) -> bool:
+        """Whether the loads have an energy."""
         return not self.moments.any()
 
-    def scaled(self, factor):
+    def scaled(self, factor: float) -> "NodalLoads":
+        """`factor` times the loads."""
         out = NodalLoads(0)
-        out.forces, out.spreads, out.moments = (
-            factor * self.forces,
-            factor * self.spreads,
-            factor * self.moments,
-        )
+        out.forces, out.spreads, out.moments = (factor * a for a in (self.forces, self.spreads, self.moments))
         return out
 
 
 class RodElements:
-    """lengths (n,) in mm; pieces: the reduced.rod.rod.Piece of each element; base_pose (4, 4)."""
+    """lengths (n,) in mm; pieces: of each element; base_pose (4, 4)."""
 
-    def __init__(self, lengths, pieces, base_pose):
+    def __init__(self, lengths: np.ndarray, pieces: "Sequence[RodPiece]", base_pose: np.ndarray) -> None:
         self.lengths, self.base_pose = np.asarray(lengths, float), base_pose
         self._h = self.lengths[:, None, None]
-        groups = {}
+        groups: dict[tuple[int, float], tuple[SectionLaw, float, list[int]]] = {}
         for i, piece in enumerate(pieces):
             groups.setdefault((id(piece.law), piece.pressure), (piece.law, piece.pressure, []))[2].append(i)
         self._groups = [(law, P, np.array(index)) for law, P, index in groups.values()]
@@ -67,18 +73,18 @@ class RodElements:
             out[index] = getattr(law, method)(q[index], P)
         return out
 
-    def free(self):
+    def free(self) -> np.ndarray:
         """(n, 6) twists of the free state."""
         out = np.empty((len(self.lengths), 6))
         for law, P, index in self._groups:
             out[index] = law.free_strains(P)
         return out[:, TWIST_ORDER]
 
-    def wrenches(self, x):
+    def wrenches(self, x: np.ndarray) -> np.ndarray:
         """(n, 6) section moments (N mm) and forces (N) in the section frames."""
         return self._by_law("force", x, (6,))[:, TWIST_ORDER]
 
-    def poses(self, x):
+    def poses(self, x: np.ndarray) -> np.ndarray:
         """(n + 1, 4, 4) frames of the nodes."""
         return self._chained(se3.exp_pose(x * self.lengths[:, None]))
 
@@ -89,7 +95,7 @@ class RodElements:
             before.dot(step, after)
         return out
 
-    def energy(self, x, loads):
+    def energy(self, x: np.ndarray, loads: NodalLoads) -> float:
         """Enthalpy of the sections less the work of the forces, N mm; moments fixed in space have no
         energy."""
         poses = self.poses(x)[1:]
@@ -98,7 +104,7 @@ class RodElements:
             - np.trace(_turned(poses, loads), axis1=1, axis2=2).sum()
         )
 
-    def gradient(self, x, loads):
+    def gradient(self, x: np.ndarray, loads: NodalLoads) -> np.ndarray:
         """(n, 6) generalised forces that balance to zero: the energy's gradient by x, moments' work
         included."""
         poses = self.poses(x)
@@ -108,7 +114,7 @@ class RodElements:
             - (_transposed(self._carriers(x, poses)) @ outward[..., None])[..., 0]
         )
 
-    def hessian(self, x, loads):
+    def hessian(self, x: np.ndarray, loads: NodalLoads) -> np.ndarray:
         """(n, 6, n, 6) derivative of `gradient` by x, dense; symmetric for conservative loads. For tests and
         small rods."""
         n, blocks = len(x), self._linearised(x, loads)[1]
@@ -147,7 +153,7 @@ class RodElements:
         imbalance[:-1] -= imbalance[1:].copy()
         return inverse, (diagonal, -(M + C)[1:], -M[1:]), imbalance
 
-    def newton_step(self, x, loads):
+    def newton_step(self, x: np.ndarray, loads: NodalLoads) -> tuple[np.ndarray | None, np.ndarray]:
         """(step (n, 6) for x, banded matrix in LAPACK's storage for `is_minimum`); None instead of the step
         when singular."""
         inverse, blocks, imbalance = self._linearised(x, loads)
@@ -168,7 +174,7 @@ class RodElements:
         return (inverse @ V[..., None])[..., 0], kept
 
 
-def is_minimum(band):
+def is_minimum(band: np.ndarray) -> bool:
     """Whether the tangent of `newton_step` is positive definite: the equilibrium is stable at these
     (conservative) loads."""
     try:

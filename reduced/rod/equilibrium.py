@@ -1,10 +1,15 @@
 """The way to a rod's equilibrium: Newton's method, load steps where a whole one fails, elements halved until
 the answer stands still."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pneunet.base.errors import ConvergenceError
 from pneunet.reduced.rod.elements import NodalLoads, RodElements, is_minimum
+
+if TYPE_CHECKING:
+    from pneunet.reduced.rod.rod import Rod
 
 ITERATIONS = 12
 #: a Newton step turns the rod by at most so much, summed along it (rad), and strains it by at most so much;
@@ -25,7 +30,7 @@ class Grid:
     vectors: gravity (3,) in mm/s2, tip force in N, tip moment in N mm, distributed force in N/mm.
     """
 
-    def __init__(self, rod, counts, vectors):
+    def __init__(self, rod: "Rod", counts: np.ndarray, vectors: list[np.ndarray]) -> None:
         gravity, tip_force, tip_moment, distributed = vectors
         self.counts, self.iterations, self.load_steps = counts, 0, 0
         owner = np.repeat(np.arange(len(counts)), counts)
@@ -42,7 +47,7 @@ class Grid:
         self.loads.add(-1, tip_force, (0.0, *rod.tip_centre))
         self.loads.moments[-1] += tip_moment
 
-    def from_coarser(self, coarse, x):
+    def from_coarser(self, coarse: "Grid", x: np.ndarray) -> np.ndarray:
         """x (n, 6) of the grid `coarse` on this one: linear in between within each piece."""
         first = np.repeat(np.cumsum(coarse.counts) - coarse.counts, coarse.counts)
         last = first + np.repeat(coarse.counts, coarse.counts) - 1
@@ -54,7 +59,7 @@ class Grid:
         second = np.arange(len(parent)) - (np.cumsum(halves) - halves)[parent]
         return x[parent] + ((halves[parent] - 1) * (second - 0.5) / 2)[:, None] * slope[parent]
 
-    def newton(self, x, factor, small):
+    def newton(self, x: np.ndarray, factor: float, small: float) -> np.ndarray | None:
         """The equilibrium near x (n, 6) under `factor` of the loads, or None: not found, or (without moments)
         not stable.
 
@@ -75,7 +80,7 @@ class Grid:
                 return x if not loads.conservative or is_minimum(tangent) else None
         return None
 
-    def follow(self, small, step=1.0):
+    def follow(self, small: float, step: float = 1.0) -> np.ndarray:
         """The equilibrium reached from the free state, the loads growing, from a first `step` on, as fast as
         Newton's method lets them."""
         x, before, reached = self.elements.free(), None, 0.0
@@ -97,7 +102,9 @@ class Grid:
         return x
 
 
-def refine(rod, vectors, tolerance, first_load):
+def refine(
+    rod: "Rod", vectors: list[np.ndarray], tolerance: float, first_load: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, int, int]:
     """(s (n + 1,), poses (n + 1, 4, 4), wrenches (n, 6), error in mm, iterations, load steps) of a rod's
     equilibrium.
 
@@ -130,5 +137,5 @@ def refine(rod, vectors, tolerance, first_load):
                 return grid.s, poses, grid.elements.wrenches(x), error, iterations, load_steps
         before = grid, x, poses
     raise ConvergenceError(
-        f"rod: {len(x)} elements leave an error of {error:.2g} mm: ask for a larger tolerance"
+        f"rod: {counts.sum()} elements leave an error of {error:.2g} mm: ask for a larger tolerance"
     )

@@ -8,7 +8,9 @@ so that the solid keeps its volume. Chambers move with the sections; their swell
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.reduced.model import predict
+from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.prediction import predict
 
 
 def _box(divisions):
@@ -32,7 +34,7 @@ def _box(divisions):
     return np.concatenate(points), np.concatenate(quads)
 
 
-def segment_outline(segment, spacing=1.0):
+def segment_outline(segment: Segment, spacing: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Undeformed outline of one segment from x = 0: vertices (n, 3) in mm and quads (m, 4), turned
     outwards."""
     s = segment
@@ -58,8 +60,14 @@ def segment_outline(segment, spacing=1.0):
     return np.concatenate(vertices), np.concatenate(all_quads)
 
 
-def body_surface(manipulator, pressure, law, spacing=1.0, base_pose=None):
-    """The deformed outline of a manipulator at `pressure` (MPa) by a SegmentLaw.
+def body_surface(
+    manipulator: Manipulator,
+    pressure: float,
+    law: SegmentLaw,
+    spacing: float = 1.0,
+    base_pose: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The deformed outline of a manipulator at `pressure` (MPa).
 
     Returns vertices (n, 3) in mm, quads (m, 4) of vertex numbers, and the segment's index of each quad (m,).
     spacing: edge length along the body, mm; base_pose (4, 4) as in `predict`.

@@ -6,41 +6,47 @@ whole step fails; elements are halved until the answer stands still (reduced.rod
 fixed in space.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base.errors import InputError
 from pneunet.base.strains import RodStrains
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced.rod.areas import active_mass, passive_mass
 from pneunet.reduced.rod.centreline import Centreline, centreline
-from pneunet.reduced.rod.ends import end_turn
+from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.equilibrium import refine
-from pneunet.reduced.rod.laws import passive_law
-
-#: what a law must have; see reduced.rod.laws.RodLaw
-LAW = ("free_strains", "psi", "force", "stiffness")
+from pneunet.reduced.rod.laws import SectionLaw, SegmentLaw
+from pneunet.reduced.rod.quadratic import QuadraticLaw, passive_law
 
 
 @dataclass(frozen=True)
-class Piece:
-    """A run of equal sections. length in mm; law: reduced.rod.laws.RodLaw; pressure in MPa; mass per
-    undeformed length in tonne/mm with its centre (y, z) in mm."""
+class RodPiece:
+    """A run of equal sections. length in mm; pressure in MPa; mass per undeformed length in tonne/mm with its
+    centre (y, z) in mm; free (6,): the law's free strains there, where they are known already."""
 
     length: float
-    law: object
+    law: SectionLaw
     pressure: float = 0.0
     mass: float = 0.0
-    mass_centre: tuple = (0.0, 0.0)
+    mass_centre: tuple[float, float] = (0.0, 0.0)
+    free: np.ndarray | None = field(default=None, compare=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (np.isfinite(self.length) and self.length > 0):
             raise InputError(f"length_mm = {self.length:g}: a piece of a rod must be longer than 0")
-        if not all(callable(getattr(self.law, name, None)) for name in LAW):
-            raise InputError(f"law: {type(self.law).__name__} is no rod law, which has {', '.join(LAW)}")
+        if not isinstance(self.law, SectionLaw):
+            raise InputError(
+                f"law: {type(self.law).__name__} is no SectionLaw, which has free_strains, psi, force and"
+                " stiffness"
+            )
         if not (np.isfinite(self.pressure) and self.pressure >= 0):
-            raise InputError(f"pressure_kPa = {self.pressure * 1e3:g}: give a finite value >= 0")
+            raise InputError(f"pressure_kPa = {self.pressure * KPA_PER_MPA:g}: give a finite value >= 0")
         if not (np.isfinite(self.mass) and self.mass >= 0):
             raise InputError(f"mass = {self.mass:g} tonne/mm: give a finite value >= 0")
 
@@ -50,11 +56,11 @@ class Rod:
     """Pieces from base to tip; base_pose (4, 4): the clamp's frame in space, mm; tip_centre: (y, z) in mm of
     the tip's frame where tip forces act."""
 
-    pieces: tuple
+    pieces: Sequence[RodPiece]
     base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
-    tip_centre: tuple = (0.0, 0.0)
+    tip_centre: tuple[float, float] = (0.0, 0.0)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "pieces", tuple(self.pieces))
         object.__setattr__(self, "base_pose", np.asarray(self.base_pose, float))
         if not self.pieces:
@@ -66,33 +72,44 @@ class Rod:
             raise InputError("base_pose: give a (4, 4) pose with a rotation matrix")
 
     @classmethod
-    def of(cls, manipulator, laws, pressure, base_pose=None, end_effects=True):
+    def of(
+        cls,
+        manipulator: Manipulator,
+        laws: SegmentLaw | Sequence[SegmentLaw],
+        pressure: float | ArrayLike,
+        base_pose: np.ndarray | None = None,
+        end_effects: bool = True,
+    ) -> "Rod":
         """The rod of a Manipulator. laws, pressure (MPa): one for all segments or one for each.
 
         end_effects (docs/theory-reduced.md): every chamber counts with its whole pitch, half a gap at the
         ends included, and the ends of slanted one-sided segments turn about z; False: active from outermost
         wall to outermost wall, ends straight.
         """
-        n = len(manipulator.segments)
-        laws = list(laws) if isinstance(laws, (list, tuple)) else [laws] * n
-        pressures = (
-            np.broadcast_to(np.asarray(pressure, float), n) if np.shape(pressure) in ((), (n,)) else ()
-        )
-        if len(laws) != n or len(pressures) != n:
+        segments, n = manipulator.segments, len(manipulator.segments)
+        laws = list(laws) if isinstance(laws, Sequence) else [laws] * n
+        for law in laws:
+            if not isinstance(law, SegmentLaw):
+                raise InputError(f"laws: {type(law).__name__} is no SegmentLaw, such as choose_law() gives")
+        if len(laws) != n or np.shape(pressure) not in ((), (n,)):
             raise InputError(f"laws, pressure_kPa: give one for all or one for each of the {n} segments")
-        pieces, known = [], {}
-        for segment, law, P in zip(manipulator.segments, laws, map(float, pressures)):
-            reach = segment.gap / segment.sin / 2 if end_effects else 0.0
-            turn = end_turn(segment, law.free_strains(P)) if end_effects else 0.0
-            length, (mass, z) = segment.end_length - reach, passive_mass(segment)
-            bare = [
-                known.setdefault((segment.key, t), passive_law(segment, t))
-                for t in (turn / length, -turn / length)
-            ]
-            before, behind = (Piece(length, own, 0.0, mass, (0.0, z)) for own in bare)
-            mass, z = active_mass(segment)
-            pieces += [before, Piece(segment.active_length + 2 * reach, law, P, mass, (0.0, z)), behind]
-        last = manipulator.segments[-1]
+        pressures, free = np.broadcast_to(np.asarray(pressure, float), n), np.empty((n, 6))
+        for law in set(laws):  # all at once, as `predict` does
+            rows = [i for i in range(n) if laws[i] is law]
+            free[rows] = law.each([segments[i] for i in rows], pressures[rows]).vector
+        lengths, strains = free_pieces(segments, RodStrains.of_vector(free), end_effects=end_effects)
+        pieces: list[RodPiece] = []
+        known: dict[tuple[Segment, float], QuadraticLaw] = {}
+        for i, (length, q) in enumerate(zip(lengths.tolist(), strains.vector)):  # three of each segment
+            segment, law, P = segments[i // 3], laws[i // 3], float(pressures[i // 3])
+            if i % 3 == 1:
+                mass, z = active_mass(segment)
+                pieces.append(RodPiece(length, law.of(segment), P, mass, (0.0, z), q))
+            else:
+                (mass, z), bend = passive_mass(segment), float(q[5])
+                bare = known.setdefault((segment.key, bend), passive_law(segment, bend))
+                pieces.append(RodPiece(length, bare, 0.0, mass, (0.0, z), q))
+        last = segments[-1]
         return cls(
             pieces,
             np.eye(4) if base_pose is None else base_pose,
@@ -100,28 +117,35 @@ class Rod:
         )
 
     @property
-    def lengths(self):
+    def lengths(self) -> np.ndarray:
         """(pieces,) undeformed, mm."""
         return np.array([p.length for p in self.pieces])
 
     @property
-    def free_strains(self):
+    def free_strains(self) -> RodStrains:
         """RodStrains (pieces, 3) without loads."""
-        q = np.array([p.law.free_strains(p.pressure) for p in self.pieces])
-        return RodStrains(q[:, :3], q[:, 3:])
+        known = (p.law.free_strains(p.pressure) if p.free is None else p.free for p in self.pieces)
+        return RodStrains.of_vector(list(known))
 
-    def free(self, spacing=1.0):
+    def free(self, spacing: float = 1.0) -> Centreline:
         """The Centreline without loads, sampled every `spacing` mm."""
         return centreline(self.lengths, self.free_strains, spacing, self.base_pose)
 
-    def equilibrium(self, loads=None, distributed=(0.0, 0.0, 0.0), tolerance=5e-4, first_load=1.0):
+    def equilibrium(
+        self,
+        loads: DeadLoads | None = None,
+        distributed: ArrayLike = (0.0, 0.0, 0.0),
+        tolerance: float = 5e-4,
+        first_load: float = 1.0,
+    ) -> "RodState":
         """The RodState under `loads` (geometry.loading.DeadLoads, in the coordinates of base_pose) and
         `distributed` (3,), a force on the line in N per mm of undeformed length.
 
         tolerance: of the rod's length; elements are halved until the nodes' estimated error is below.
         ConvergenceError, with the share of the loads that was reached, where no stable equilibrium follows
         (with a tip moment: no equilibrium). first_load: the share of the loads put on first; where several
-        stable equilibria exist, a small one leads to that of slow loading.
+        stable equilibria exist, a small one leads to that of slow loading. InputError for laws that know free
+        shapes alone.
         """
         loads = loads or DeadLoads()
         for name, value, low, high in (
@@ -137,8 +161,9 @@ class Rod:
             raise InputError(
                 "loads: give three finite numbers each for gravity, tip_force, tip_moment and distributed"
             )
-        s, poses, wrench, *effort = refine(self, vectors, tolerance, first_load)
-        return RodState(Centreline(s, poses), wrench[:, 3:], wrench[:, :3], *effort)
+        s, poses, wrench, error, iterations, load_steps = refine(self, vectors, tolerance, first_load)
+        moment, force = wrench[:, :3], wrench[:, 3:]
+        return RodState(Centreline(s, poses), force, moment, error, iterations, load_steps)
 
 
 @dataclass(frozen=True)
@@ -156,6 +181,6 @@ class RodState:
     load_steps: int
 
     @property
-    def tip(self):
+    def tip(self) -> np.ndarray:
         """(4, 4) frame of the tip."""
         return self.line.poses[-1]

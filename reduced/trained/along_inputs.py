@@ -1,6 +1,10 @@
 """A Gaussian process along some of its inputs, as a search for a root along them asks for."""
 
+from collections.abc import Sequence
+
 import numpy as np
+
+from pneunet.reduced.trained.gaussian import GaussianProcess
 
 
 class AlongInputs:
@@ -12,7 +16,7 @@ class AlongInputs:
     sums over the inducing points of k, k b.w_i and k b.w_i b.w_j.
     """
 
-    def __init__(self, process, places):
+    def __init__(self, process: GaussianProcess, places: Sequence[int]) -> None:
         self._process, m = process, len(process.points)
         self._ways, weights = process.to_kernel[list(places)], process.weights[:m, :1]
         b = process.points @ self._ways.T
@@ -21,7 +25,7 @@ class AlongInputs:
         )
         self._square, self._slope = self._ways @ self._ways.T, process.plane[list(places), 0]
 
-    def at(self, x):
+    def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(value (n,), slopes (n, p), second derivatives (n, p, p)) at inputs (n, d)."""
         linear, (p, d) = self._process.linear(x), self._ways.shape
         sums, a = self._process.kernels(linear).dot(self._weights), linear[:, :d].dot(self._ways.T)

@@ -30,11 +30,12 @@ class Closing:
     process: SideBySide | None
 
     @cached_property
-    def coordinates(self):
+    def coordinates(self) -> Coordinates:
         return Coordinates(self.kind)
 
     @cached_property
     def _along(self):
+        assert self.process
         return AlongInputs(self.process.processes[0], [-1])
 
     @property
@@ -42,7 +43,7 @@ class Closing:
         """Whether the load changes along a search for the leading strain at a pressure."""
         return self.process is not None and self.kind == ONE_SIDED
 
-    def overlap(self, shape, pressure, lead):
+    def overlap(self, shape: np.ndarray, pressure: np.ndarray, lead: np.ndarray) -> np.ndarray:
         """(n,) of walls, over the normal pitch, in free states of shape numbers (n, 13) at P/mu (n,) and the
         leading strain (n,); less than 0 while they are apart."""
         if self.process is None:
@@ -50,27 +51,31 @@ class Closing:
         load = self.coordinates.closing_load(pressure, lead)
         return self.process(self.coordinates.closing_inputs(shape, load))[:, 0] * load - shape[:, GAP]
 
-    def closed(self, shape, pressure, strains):
+    def closed(self, shape: np.ndarray, pressure: np.ndarray, strains: np.ndarray) -> np.ndarray:
         """(n,) part of the gap that walls have closed in free states with these strains (n, 6): from 1 on
         they touch."""
         return 1 + self.overlap(shape, pressure, self.coordinates.leading(strains)) / np.maximum(
             shape[:, GAP], SMALLEST
         )
 
-    def overlap_and_slopes(self, shape, pressure, lead):
+    def overlap_and_slopes(
+        self, shape: np.ndarray, pressure: np.ndarray, lead: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(overlap (n,), its derivatives by the shape numbers and P/mu (n, 14) and by the leading strain
         (n,))."""
         if self.process is None:
             return -np.ones(len(shape)), np.zeros((len(shape), shape.shape[1] + 1)), np.zeros(len(shape))
         co, load = self.coordinates, self.coordinates.closing_load(pressure, lead)
-        closing, slopes = self.process(co.closing_inputs(shape, load), derivative=True)
+        closing, slopes = self.process.with_slopes(co.closing_inputs(shape, load))
         by = co.by_shape(shape, slopes)[:, 0] * load[:, None]
         by[:, GAP] -= 1
         by_load = closing[:, 0] + slopes[:, 0, -1] * load
         by[:, -1] = 0 if self._by_strain else by_load
         return closing[:, 0] * load - shape[:, GAP], by, by_load * self._by_strain
 
-    def along(self, inputs, shape, pressure, lead):
+    def along(
+        self, inputs: np.ndarray, shape: np.ndarray, pressure: np.ndarray, lead: np.ndarray
+    ) -> tuple[np.ndarray, float | np.ndarray, float | np.ndarray]:
         """(overlap (n,), its first and second derivative by the leading strain, (n,) or 0); inputs:
         Coordinates.inputs (n, .), of which those of the shape are taken."""
         if self.process is None:

@@ -14,19 +14,18 @@ from functools import cached_property
 
 import numpy as np
 
+from pneunet.base.strains import MIRROR, RodStrains
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING
 from pneunet.geometry.shape_numbers import SHAPE
 
-#: of (e1, e2, e3, k1, k2, k3) in the mirror y -> -y
-MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-REST = np.eye(6)[0]
+REST = RodStrains.unstrained().vector
 #: P/mu below which the response is linear anyway: the logarithm is taken of their sum
 SMALL_PRESSURE = 0.01
 #: the same of the leading strain
 SMALL_STRAIN = 0.1
 #: what loads a cell and what holds it: kind -> name -> sum of Segment's lengths; as many as the sample varies
 #: on their own. (Measured: a tenth off the error of the free strains against the lengths themselves.)
-_OF_BOTH = {
+_OF_BOTH: dict[str, dict[str, float]] = {
     "width": {"width": 1},
     "cavity's rise over the core": {
         "cavity_floor": 1,
@@ -70,7 +69,7 @@ class Coordinates:
 
     kind: str
 
-    def inputs(self, shape, pressure, level):
+    def inputs(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
         """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a
         number."""
         x = np.empty((len(shape), len(LENGTHS[self.kind]) + 3))
@@ -80,13 +79,15 @@ class Coordinates:
         x[:, 1:-2] = np.log(self._lengths(shape))
         return x
 
-    def ranged(self, shape, pressure, level):
+    def ranged(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
         """(n, r) what the training designs' ranges are told of: the inputs, and the logarithms of the lengths
         that those know only in sums."""
         apart = np.log(np.maximum(shape[:, [SHAPE.index(name) for name in IN_SUMS[self.kind]]], SMALLEST))
         return np.hstack([self.inputs(shape, pressure, level), apart])
 
-    def path_inputs(self, shape, lead, level, overlap):
+    def path_inputs(
+        self, shape: np.ndarray, lead: np.ndarray, level: float | np.ndarray, overlap: np.ndarray
+    ) -> np.ndarray:
         """(n, d + 1) the same with the leading strain (n,) in the place of the pressure, and `overlap_input`
         (n,)."""
         x = self.inputs(shape, np.zeros(len(shape)), level)
@@ -94,45 +95,47 @@ class Coordinates:
         return np.column_stack([x, self.overlap_input(overlap)])
 
     @staticmethod
-    def overlap_input(overlap):
+    def overlap_input(overlap: np.ndarray) -> np.ndarray:
         """(n,) regression input of by how much walls would overlap (n,), in normal pitches: the same for all
         that are apart."""
         return np.log(np.maximum(overlap, 0) + SMALL_OVERLAP)
 
     @staticmethod
-    def overlap_input_slope(overlap):
+    def overlap_input_slope(overlap: np.ndarray) -> np.ndarray:
         """(n,) its derivative."""
         return (overlap > 0) / (np.maximum(overlap, 0) + SMALL_OVERLAP)
 
-    def leading(self, strains):
+    def leading(self, strains: np.ndarray) -> np.ndarray:
         """(n,) the leading one of the strains (n, 6), 0 at rest."""
         lead = LEADING[self.kind][0]
         return strains[:, lead] - REST[lead]
 
-    def closing_load(self, pressure, lead):
+    def closing_load(self, pressure: np.ndarray, lead: np.ndarray) -> np.ndarray:
         """(n,) what walls close in proportion to, almost: the leading strain of a one-sided, the pressure of
         a twisting segment, whose stretch opens the gaps while its walls bulge. (Measured, of the load at
         which walls touch: the 90th percentile of the error is 9 and 7 % of the top one; the other way round
         20 and 15 %.)"""
         return lead if self.kind == ONE_SIDED else pressure
 
-    def closing_inputs(self, shape, load):
+    def closing_inputs(self, shape: np.ndarray, load: np.ndarray) -> np.ndarray:
         """(n, d - 1) regression inputs of how far walls close over the load (n,): the same, whatever the
         mesh."""
         return self.with_load(self.inputs(shape, np.zeros(len(shape)), 0), load)
 
-    def with_load(self, inputs, load):
+    def with_load(self, inputs: np.ndarray, load: np.ndarray) -> np.ndarray:
         """(n, d - 1) the same with what `inputs` (n, .) say of the shape."""
         return np.concatenate([inputs[:, : len(LENGTHS[self.kind]) + 1], load[:, None]], axis=1)
 
-    def stiffness_inputs(self, shape, strains, level):
+    def stiffness_inputs(
+        self, shape: np.ndarray, strains: np.ndarray, level: float | np.ndarray
+    ) -> np.ndarray:
         """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place
         of the pressure. (What softens a cell is how far it has gone; measured: a fifth off the error.)"""
         x = self.inputs(shape, np.zeros(len(shape)), level)
         x[:, -2] = self.leading(strains)
         return x
 
-    def contact_inputs(self, shape, strains, closed):
+    def contact_inputs(self, shape: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> np.ndarray:
         """(n, d) those of what contact adds to it, the same, whatever the mesh: by how much walls would
         overlap, having `closed` (n,) so much of their gap, in the mesh's place."""
         x = self.stiffness_inputs(shape, strains, 0)
@@ -140,12 +143,12 @@ class Coordinates:
         return x
 
     @staticmethod
-    def touch(closed):
+    def touch(closed: np.ndarray) -> np.ndarray:
         """(n,) from 0 to 1, whether walls touch that have closed so much (n,) of their gap, as if they could
         go on."""
         return 1 / (1 + np.exp(-np.clip(np.log(np.maximum(closed, TINY)) / TOUCH_WIDTH, -30, 30)))
 
-    def around_inputs(self, shape, strains, closed):
+    def around_inputs(self, shape: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> np.ndarray:
         """(n, d + 1) what the enthalpy around free states depends on: the same, and whether walls touch."""
         return np.column_stack([self.contact_inputs(shape, strains, closed), self.touch(closed)])
 
@@ -162,14 +165,14 @@ class Coordinates:
         return np.maximum(shape.dot(self._sums), SMALLEST)
 
     @property
-    def names(self):
+    def names(self) -> list[str]:
         """What `told` gives."""
         lengths, apart = (
             [f"{name} / normal pitch" for name in names] for names in (LENGTHS[self.kind], IN_SUMS[self.kind])
         )
         return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh", *apart]
 
-    def told(self, ranged):
+    def told(self, ranged: np.ndarray) -> np.ndarray:
         """(r,) `ranged` (r,) as a user knows it: degrees, ratios."""
         squared_cosine, lengths, pressure, level, apart = np.split(
             ranged, [1, *(1 + len(LENGTHS[self.kind]) + np.arange(3))]
@@ -181,12 +184,12 @@ class Coordinates:
 
     # ---- free strains
     @cached_property
-    def strain_parity(self):
+    def strain_parity(self) -> np.ndarray:
         """(p,) of the learned strains: 1 even, -1 odd."""
         lead, others = LEADING[self.kind]
         return MIRROR[[lead, *others]]
 
-    def learned_strains(self, shape, pressure, strains):
+    def learned_strains(self, shape: np.ndarray, pressure: np.ndarray, strains: np.ndarray) -> np.ndarray:
         """(n, p) from strains (n, 6) at P > 0: the logarithm of the pressure over the leading one, and the
         others over that."""
         lead, others = LEADING[self.kind]
@@ -194,7 +197,7 @@ class Coordinates:
         ratios = q[:, others] / q[:, [lead]] / odd(self.strain_parity[1:], cosine(shape))
         return np.column_stack([np.log(pressure / q[:, lead]), ratios])
 
-    def strains(self, shape, lead, ratios):
+    def strains(self, shape: np.ndarray, lead: np.ndarray, ratios: np.ndarray) -> np.ndarray:
         """(n, 6) of the leading strain (n,) and the others' learned ratios (n, p - 1)."""
         of_lead, of_others = self._places
         lead = lead[:, None]
@@ -208,7 +211,7 @@ class Coordinates:
         first, others = LEADING[self.kind]
         return np.eye(6)[first], np.eye(6)[list(others)]
 
-    def by_shape(self, shape, slopes):
+    def by_shape(self, shape: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, .) by inputs,
         those by others than the shape left out; one more, 0, for the pressure."""
         by = np.zeros((*slopes.shape[:2], len(SHAPE) + 1))
@@ -218,7 +221,14 @@ class Coordinates:
         by[:, :, 0] = slopes[:, :, 0] * (2 * cosine(shape) * _by_angle(shape))[:, None]
         return by
 
-    def strain_slopes(self, shape, lead, ratios, by_ratios, by_lead):
+    def strain_slopes(
+        self,
+        shape: np.ndarray,
+        lead: np.ndarray,
+        ratios: np.ndarray,
+        by_ratios: np.ndarray,
+        by_lead: np.ndarray,
+    ) -> np.ndarray:
         """(n, 6, 14) derivatives of `strains` by the shape numbers and P/mu, of those (n, p - 1, 14) of the
         ratios and (n, 14) of the leading strain."""
         first, others = LEADING[self.kind]
@@ -235,7 +245,8 @@ class Coordinates:
 
     # ---- stiffness
     @property
-    def stiffness_parity(self):
+    def stiffness_parity(self) -> np.ndarray:
+        """(p,) the same of what is learned of the stiffness."""
         return np.concatenate([self._parity(block) for block in BLOCKS[self.kind]])
 
     @staticmethod
@@ -245,15 +256,13 @@ class Coordinates:
         return np.concatenate([np.ones(len(block)), s[i] * s[j]])
 
     @property
-    def bending(self):
+    def bending(self) -> int:
         """Place of the bending stiffness, that of k2, among what is learned: what contact adds most to."""
-        start = 0
-        for block in BLOCKS[self.kind]:
-            if 4 in block:
-                return start + block.index(4)
-            start += len(block) * (len(block) + 1) // 2
+        blocks = BLOCKS[self.kind]
+        at = next(i for i, block in enumerate(blocks) if 4 in block)
+        return sum(len(block) * (len(block) + 1) // 2 for block in blocks[:at]) + blocks[at].index(4)
 
-    def learned_stiffness(self, shape, matrices):
+    def learned_stiffness(self, shape: np.ndarray, matrices: np.ndarray) -> np.ndarray:
         """(n, p) from stiffness (n, 6, 6), of which what the symmetries forbid is left out. Not positive
         definite: nan."""
         c, out = cosine(shape), []
@@ -268,7 +277,7 @@ class Coordinates:
             out += [2 * np.log(diagonal), (factor / diagonal[:, None, :])[:, i, j] / odd(parity, c)]
         return np.hstack(out)
 
-    def stiffness(self, shape, learned):
+    def stiffness(self, shape: np.ndarray, learned: np.ndarray) -> np.ndarray:
         """(n, 6, 6), symmetric and positive definite, back from (n, p)."""
         c, K, start = cosine(shape), np.zeros((len(learned), 6, 6)), 0
         for block in BLOCKS[self.kind]:
@@ -288,11 +297,11 @@ def _by_angle(shape):
     return -np.radians(1.0) * np.sin(np.radians(shape[:, 0]))
 
 
-def cosine(shape):
+def cosine(shape: np.ndarray) -> np.ndarray:
     """(n,) cos(angle) of shape numbers (n, 13)."""
     return np.cos(np.radians(shape[:, 0]))
 
 
-def odd(parity, c):
+def odd(parity: np.ndarray, c: np.ndarray) -> np.ndarray:
     """(n, p): c where parity (p,) is -1, 1 where it is 1."""
     return np.where(parity < 0, c[:, None], 1.0)

@@ -15,17 +15,17 @@ from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
-from pneunet.reduced.trained.coordinates import BLOCKS, MIRROR, odd
+from pneunet.base.strains import MIRROR
+from pneunet.reduced.trained.coordinates import BLOCKS, odd
 
 DEGREES = (3, 4)
-#: added to the normal equations of relative forces, for constant parts and for slopes: keeps what nothing
-#: determines small
-RIDGE = 1e-4, 1e-2
+#: second derivatives of the cubic (n, 6, 36) and of the quartic form (n, 36, 36)
+Tensors = tuple[np.ndarray, np.ndarray]
 #: standard deviations of the inputs beyond which coefficients stay as they are
 FURTHEST = 2.0
 
 
-def monomials(kind):
+def monomials(kind: str) -> list[tuple[int, ...]]:
     """[(indices, ...)] of the degrees, only those that every half turn leaves alone: even in each block but
     the first."""
     out = []
@@ -36,7 +36,7 @@ def monomials(kind):
     return out
 
 
-def whitening(kind, K):
+def whitening(kind: str, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(M (n, 6, 6), D1 (n,)) with v = M d, of stiffnesses (n, 6, 6)."""
     M = np.zeros(K.shape)
     for block in BLOCKS[kind]:
@@ -75,17 +75,17 @@ class Anharmonic:
             out.append(tensors.reshape(len(rows), -1))
         return out
 
-    def at(self, x, c):
-        """Tensors (cubic (n, 6, 36), quartic (n, 36, 36)) of free states with inputs x (n, f) and cos(angle)
+    def at(self, x: np.ndarray, c: np.ndarray) -> Tensors:
+        """Of free states with inputs x (n, f) and cos(angle)
         (n,)."""
-        by_state = features(x, self.centre, self.width) @ self.coefficients.T * odd(_parity(self.kind), c)
+        by_state = features(x, self.centre, self.width) @ self.coefficients.T * odd(parity(self.kind), c)
         cubic, quartic = self._tensors
         parts = by_state[:, : len(cubic)] @ cubic, by_state[:, len(cubic) :] @ quartic
         return parts[0].reshape(-1, 6, 36), parts[1].reshape(-1, 36, 36)
 
 
-def features(x, centre, width):
-    """(n, 1 + f)"""
+def features(x: np.ndarray, centre: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """(n, 1 + f) of inputs (n, f): 1, and what coefficients are linear in."""
     return np.column_stack([np.ones(len(x)), np.clip((x - centre) / width, -FURTHEST, FURTHEST)])
 
 
@@ -96,59 +96,24 @@ def _hessians(v, tensors):
     return [(a[:, None, :] @ tensor)[:, 0].reshape(-1, 6, 6) for a, tensor in zip((v, squares), tensors)]
 
 
-def anharmonic_value(v, tensors):
+def anharmonic_value(v: np.ndarray, tensors: Tensors) -> np.ndarray:
     """(n,) of the cubic and quartic form."""
     cubic, quartic = _hessians(v, tensors)
     return (v[:, None, :] @ (cubic / 6 + quartic / 12) @ v[:, :, None])[:, 0, 0]
 
 
-def anharmonic_gradient(v, tensors):
-    """(n, 6)"""
+def anharmonic_gradient(v: np.ndarray, tensors: Tensors) -> np.ndarray:
+    """(n, 6) of its derivatives by v."""
     cubic, quartic = _hessians(v, tensors)
     return ((cubic / 2 + quartic / 3) @ v[:, :, None])[:, :, 0]
 
 
-def anharmonic_hessian(v, tensors):
-    """(n, 6, 6)"""
-    return sum(_hessians(v, tensors))
+def anharmonic_hessian(v: np.ndarray, tensors: Tensors) -> np.ndarray:
+    """(n, 6, 6) of its second derivatives."""
+    cubic, quartic = _hessians(v, tensors)
+    return cubic + quartic
 
 
-def _parity(kind):
+def parity(kind: str) -> np.ndarray:
     """(m,) -1 for monomials that are odd in the mirror image."""
     return np.array([np.prod(MIRROR[list(m)]) for m in monomials(kind)])
-
-
-def _gradients(kind, v, c):
-    """(n, m, 6) gradients of the monomials, times cos(angle) where odd."""
-    listed = monomials(kind)
-    powers = np.array([[m.count(i) for i in range(6)] for m in listed])
-    out = np.stack(
-        [
-            powers[:, i] * np.prod(v[:, None, :] ** np.maximum(powers - np.eye(6, dtype=int)[i], 0), axis=2)
-            for i in range(6)
-        ],
-        axis=2,
-    )
-    return out * odd(_parity(kind), c)[:, :, None]
-
-
-def fit_anharmonic(kind, x, c, K, change, forces, ridge=RIDGE):
-    """The Anharmonic whose gradient gives the forces (n, 6) at changes (n, 6) from free states of inputs x
-    (n, f), cos(angle) c (n,) and stiffness K (n, 6, 6).
-
-    Each state weighs the same, whatever its force: errors are relative.
-    """
-    M, D1 = whitening(kind, K)
-    v = np.einsum("nij,nj->ni", M, change)
-    wanted = np.linalg.solve(np.swapaxes(M, 1, 2), forces[..., None])[..., 0] / D1[:, None]
-    size = np.linalg.norm(wanted, axis=1)[:, None]
-    centre, width = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
-    columns = _gradients(kind, v, c) / size[:, :, None]
-    columns = (columns[:, :, None, :] * features(x, centre, width)[:, None, :, None]).reshape(len(x), -1, 6)
-    A = np.swapaxes(columns, 1, 2).reshape(-1, columns.shape[1])
-    b = ((wanted - v) / size).ravel()
-    gram, own = A.T @ A, np.tile(np.repeat(ridge, [1, x.shape[1]]), len(monomials(kind)))
-    weights = np.linalg.solve(gram + np.diag(own), A.T @ b)
-    return Anharmonic(
-        kind, weights.reshape(len(monomials(kind)), -1), centre, width, float(np.linalg.norm(v, axis=1).max())
-    )

@@ -47,7 +47,7 @@ class FreePath:
     furthest: float
 
     @cached_property
-    def coordinates(self):
+    def coordinates(self) -> Coordinates:
         return Coordinates(self.kind)
 
     @cached_property
@@ -58,14 +58,17 @@ class FreePath:
     def _along(self):
         return AlongInputs(self.learned.processes[0], [LEAD, OVERLAP])
 
-    def at(self, shape, pressure, level):
+    def at(
+        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(leading strain (n,), log P beyond the path's end (n,), 0 up to it, path_inputs (n, d)) at shape
         numbers (n, 13), P/mu (n,) > 0 and the mesh's level, (n,) or a number. A path ends at its limit load,
         or where it leaves what is known."""
         if len(shape) > ROWS:
             each = shape, pressure, np.broadcast_to(level, len(shape))
             parts = [self.at(*(a[i : i + ROWS] for a in each)) for i in range(0, len(shape), ROWS)]
-            return tuple(map(np.concatenate, zip(*parts)))
+            leads, ends, path_inputs = map(np.concatenate, zip(*parts))
+            return leads, ends, path_inputs
         co, last = self.coordinates, self._last
         inputs, wanted = co.inputs(shape, pressure, level), np.log(pressure)
         v = np.minimum(self.start(inputs)[:, 0] + wanted, last)
@@ -106,7 +109,7 @@ class FreePath:
         everywhere[:, LEAD], everywhere[:, OVERLAP] = np.log(lead + SMALL_STRAIN), co.overlap_input(overlap)
         return lead, beyond * (beyond > ABOVE), everywhere
 
-    def strains(self, shape, pressure, level):
+    def strains(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
         """(n, 6) free strains."""
         lead, _, x = self.at(shape, pressure, level)
         return self.coordinates.strains(shape, lead, self.learned.rest(x))
@@ -116,14 +119,16 @@ class FreePath:
         and P/mu at a leading strain (n, p, 14), by the leading strain (n, p), d log P/d log(lead) (n,) at
         least FLAT)."""
         lead, _, x = self.at(shape, pressure, level)
-        learned, slopes = self.learned(x, derivative=True)
+        learned, slopes = self.learned.with_slopes(x)
         over, over_by, over_by_lead = self.closing.overlap_and_slopes(shape, pressure, lead)
         by_overlap = slopes[:, :, OVERLAP] * self.coordinates.overlap_input_slope(over)[:, None]
         by = self.coordinates.by_shape(shape, slopes) + by_overlap[:, :, None] * over_by[:, None]
         by_lead = slopes[:, :, LEAD] / (lead + SMALL_STRAIN)[:, None] + by_overlap * over_by_lead[:, None]
         return lead, x, learned[:, 1:], by, by_lead, np.maximum(1 + by_lead[:, 0] * lead, FLAT)
 
-    def strains_and_slopes(self, shape, pressure, level):
+    def strains_and_slopes(
+        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """(strains (n, 6), slopes (n, 6, 14)): derivatives by the 13 shape numbers (the angle in degrees) and
         P/mu."""
         lead, _, ratios, by, by_lead, steep = self._slopes(shape, pressure, level)
@@ -134,23 +139,20 @@ class FreePath:
         co = self.coordinates
         return co.strains(shape, lead, ratios), co.strain_slopes(shape, lead, ratios, by[:, 1:], lead_by)
 
-    def spread(self, shape, pressure, level):
+    def spread(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
         """(n, 6) standard deviation of the free strains as the Gaussian processes see it, taken as
         independent."""
         lead, x, ratios, _, by_lead, steep = self._slopes(shape, pressure, level)
         deviation = self.learned.deviation(x)
-        of_lead, (first, others), out = (
-            lead * deviation[:, 0] / steep,
-            LEADING[self.kind],
-            np.zeros((len(lead), 6)),
-        )
+        of_lead, (first, others) = lead * deviation[:, 0] / steep, LEADING[self.kind]
+        out = np.zeros((len(lead), 6))
         out[:, first] = of_lead
         with_lead = ratios + by_lead[:, 1:] * lead[:, None]
         c = np.abs(odd(self.coordinates.strain_parity[1:], cosine(shape)))
         out[:, others] = c * np.hypot(lead[:, None] * deviation[:, 1:], with_lead * of_lead[:, None])
         return out
 
-    def deviation(self, x):
+    def deviation(self, x: np.ndarray) -> np.ndarray:
         """(n,) standard deviation of log P at path_inputs (n, d)."""
         return self.learned.processes[0].deviation(x)[:, 0]
 

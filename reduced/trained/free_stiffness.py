@@ -25,23 +25,25 @@ class FreeStiffness:
     contact: SideBySide | None
 
     @cached_property
-    def coordinates(self):
+    def coordinates(self) -> Coordinates:
         return Coordinates(self.kind)
 
-    def at(self, shape, strains, closed, level):
+    def at(
+        self, shape: np.ndarray, strains: np.ndarray, closed: np.ndarray, level: float | np.ndarray
+    ) -> np.ndarray:
         """(n, 6, 6) of free states with these strains (n, 6) whose walls have closed so much of their gap
         (n,), on the mesh of a level."""
         co = self.coordinates
         learned = self.smooth(co.stiffness_inputs(shape, strains, level))
         touch = co.touch(closed)
-        some = touch > TINY if self.contact else np.zeros(len(shape), bool)
-        if some.any():
+        some = touch > TINY
+        if self.contact and some.any():
             added = self.contact(co.contact_inputs(shape[some], strains[some], closed[some]))
-            learned[np.ix_(some, order(co))] += touch[some, None] * added
+            learned[np.flatnonzero(some)[:, None], order(co)] += touch[some, None] * added
         return co.stiffness(shape, learned)
 
 
-def order(coordinates):
+def order(coordinates: Coordinates) -> list[int]:
     """The learned stiffnesses in the order in which contact's part is learned: that of bending, with a metric
     of its own, and the rest."""
     return [

@@ -5,41 +5,31 @@ from functools import cached_property
 
 import numpy as np
 
-from pneunet.reduced.trained import gaussian
+from pneunet.reduced.trained.gaussian import GaussianProcess
 
 
 @dataclass(frozen=True)
 class SideBySide:
     """Gaussian processes of consecutive outputs, each with metric and noise of its own, as one."""
 
-    processes: tuple
+    processes: tuple[GaussianProcess, ...]
 
-    def __call__(self, x, derivative=False):
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """(n, p) at inputs (n, d)."""
         if len(self.processes) == 1:  # a copy would cost a sixth of a call
-            return self.processes[0](x, derivative)
-        found = [process(x, derivative) for process in self.processes]
-        if not derivative:
-            return np.concatenate(found, axis=1)
-        return tuple(np.concatenate(part, axis=1) for part in zip(*found))
+            return self.processes[0](x)
+        return np.concatenate([process(x) for process in self.processes], axis=1)
+
+    def with_slopes(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(the same, derivatives by the inputs (n, p, d))."""
+        means, slopes = zip(*(process.with_slopes(x) for process in self.processes))
+        return np.concatenate(means, axis=1), np.concatenate(slopes, axis=1)
 
     @cached_property
-    def rest(self):
+    def rest(self) -> "SideBySide":
         """SideBySide of all but the first process."""
         return SideBySide(self.processes[1:])
 
-    def deviation(self, x):
+    def deviation(self, x: np.ndarray) -> np.ndarray:
         """(n, p) standard deviations at inputs (n, d), without noise."""
         return np.concatenate([process.deviation(x) for process in self.processes], axis=1)
-
-
-def fit_side_by_side(x, y, group, trust, widths, slopes=None, like=None, **settings):
-    """SideBySide processes of `widths` outputs each; the rest as for gaussian.fit."""
-    ends = np.cumsum([0, *widths])
-    likes = like.processes if like else [None] * len(widths)
-    slopes = slopes or gaussian.no_slopes(x.shape[1], y.shape[1])
-    parts = [slice(*both) for both in zip(ends, ends[1:])]
-    found = [
-        gaussian.fit(x, y[:, c], group, trust[:, c], slopes.columns(c), like=known, **settings)
-        for c, known in zip(parts, likes)
-    ]
-    return SideBySide(tuple(found))

@@ -10,33 +10,33 @@ import numpy as np
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry.shape_numbers import segment_of
-from pneunet.reduced.model import AnalyticModel
+from pneunet.reduced.analytic.law import AnalyticLaw
 from pneunet.reduced.trained.coordinates import REST, Coordinates
 from pneunet.reduced.training.fit import fit_path, fit_strains
-from pneunet.reduced.training.judging import PITCH, strain_error
+from pneunet.reduced.training.judging import PITCH, UNITS, strain_error
+from pneunet.reduced.training.states import Sample, States
 
 #: parts of the training designs in the learning curve
 CURVE = (0.25, 0.5, 1.0)
 
 
-def analytic_strains(states):
-    """(n, 6) strains of the analytic models at P > 0, nan beyond their limit loads."""
-    out, model, material = np.full(states.strains.shape, np.nan), AnalyticModel(), NeoHookean(mu=1.0)
-    scale = np.array([1, 1, 1, PITCH, PITCH, PITCH])
+def analytic_strains(states: States) -> np.ndarray:
+    """(n, 6) strains of the analytic law at P > 0, nan beyond its limit loads."""
+    out, law, material = np.full(states.strains.shape, np.nan), AnalyticLaw(), NeoHookean(mu=1.0)
     for number in np.unique(states.design):
         rows = np.flatnonzero(states.design == number)
         segment = segment_of(states.kind, states.shape[rows[0]], PITCH, material)
         for last in range(len(rows), 0, -1):
             try:
-                s = model.strains(segment, states.pressure[rows[:last]])
+                found = law.strains(segment, states.pressure[rows[:last]])
             except (ConvergenceError, InputError):
                 continue
-            out[rows[:last]] = np.hstack([s.e, s.k]) * scale
+            out[rows[:last]] = found.vector * UNITS
             break
     return out
 
 
-def compare_laws(training, held_out):
+def compare_laws(training: Sample, held_out: Sample) -> list[tuple[str, float, float, float]]:
     """[(law of the free strains, median error, 95th percentile, share without an answer)] on the coarsest
     mesh."""
     train, test = (sample.on(0).free.loaded for sample in (training, held_out))
@@ -50,7 +50,7 @@ def compare_laws(training, held_out):
         learned = [co.learned_strains(s.shape, s.pressure, a) for s, a in ((train, a_train), (test, a_test))]
     values = co.learned_strains(train.shape, train.pressure, train.strains)
     by_pressure = []
-    for y, known in ((values, 0.0), (values - learned[0], learned[1])):
+    for y, known in ((values, np.zeros(1)), (values - learned[0], learned[1])):
         process = fit_strains(train, np.isfinite(y).all(axis=1), train.inputs, y)
         found = process(test.inputs) + known
         by_pressure.append(co.strains(test.shape, test.pressure * np.exp(-found[:, 0]), found[:, 1:]))
@@ -71,7 +71,7 @@ def _spread(error):
     return float(np.median(good)), float(np.percentile(good, 95))
 
 
-def learning_curve(training, held_out):
+def learning_curve(training: Sample, held_out: Sample) -> list[tuple[int, float, float]]:
     """[(designs trained on, median error, 95th percentile)] of the free strains for the first parts of the
     training designs."""
     states, test = (sample.on(0).free.loaded for sample in (training, held_out))
@@ -83,7 +83,7 @@ def learning_curve(training, held_out):
     return rows
 
 
-def law_table(rows):
+def law_table(rows: list[tuple[str, float, float, float]]) -> list[str]:
     """Lines of a table of `compare_laws`."""
     lines = [
         "",
@@ -95,7 +95,7 @@ def law_table(rows):
     ]
 
 
-def curve_table(rows):
+def curve_table(rows: list[tuple[int, float, float]]) -> list[str]:
     """Lines of a table of `learning_curve`."""
     lines = ["", "| designs trained on | median error | 95th percentile |", "|---|---|---|"]
     return lines + [f"| {n} | {median:.4f} | {high:.4f} |" for n, median, high in rows]

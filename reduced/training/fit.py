@@ -3,20 +3,24 @@ stiffness, the enthalpy around them, and intervals from the residuals of a cross
 (conformal, with the process's deviation as their shape).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from pneunet.reduced.trained import gaussian
 from pneunet.reduced.trained.closing import Closing
 from pneunet.reduced.trained.coordinates import Coordinates, cosine, odd
-from pneunet.reduced.trained.enthalpy import fit_anharmonic
 from pneunet.reduced.trained.free_path import FreePath
 from pneunet.reduced.trained.free_stiffness import FreeStiffness, order
 from pneunet.reduced.trained.law import LOWEST, KindLaw
-from pneunet.reduced.trained.side_by_side import fit_side_by_side
+from pneunet.reduced.trained.side_by_side import SideBySide
+from pneunet.reduced.training.anharmonic import fit_anharmonic
 from pneunet.reduced.training.judging import symmetric
-from pneunet.reduced.training.states import folds
+from pneunet.reduced.training.regression import LOG_NOISES, FitSettings, Slopes, fit_side_by_side
+from pneunet.reduced.training.states import Sample, States, folds
+
+#: what a process is given, or gives, of each state
+OfStates = Callable[[States], np.ndarray]
 
 #: of the cross-validation that intervals come from
 FOLDS = 10
@@ -46,7 +50,7 @@ STEEPEST = 1.0
 #: mesh points come into contact one by one
 TELLING, CONTACT_NOISES = (
     10,
-    tuple((low, np.log(most)) for (low, _), most in zip(gaussian.LOG_NOISES, (1e-2, 1e-2, 1.0))),
+    tuple((low, np.log(most)) for (low, _), most in zip(LOG_NOISES, (1e-2, 1e-2, 1.0))),
 )
 #: states that the metric of how far walls close is found on: without slopes, and with one output, more cost
 #: little
@@ -55,111 +59,120 @@ MANY = 1200
 SMALLEST_COSINE = 0.2
 
 
-def slopes_of(states, known, inputs, outputs, some):
-    """gaussian.Slopes of the states where they are `known` (n, s), among those that are `some` (n,).
+def slopes_of(
+    states: States, known: np.ndarray, inputs: OfStates, outputs: OfStates, some: np.ndarray
+) -> Slopes:
+    """Slopes of the states where they are `known` (n, s), among those that are `some` (n,).
 
-    inputs, outputs: functions of (shape, strains, matrices, states) that give what the process sees.
+    inputs, outputs: what the process sees.
     """
     at, way = np.nonzero(known & some[:, None])
-    s, change = (
-        states.of(at),
-        (states.directions[way], states.strain_slopes[at, way], states.matrix_slopes[at, way]),
+    s, change = states.of(at), {"shape": states.directions[way]}
+    change |= {"strains": states.strain_slopes[at, way], "matrices": states.matrix_slopes[at, way]}
+    low, high = (
+        replace(s, **{name: getattr(s, name) + step * slope for name, slope in change.items()})
+        for step in (-STEP, STEP)
     )
-    ends = [
-        [a + sign * STEP * b for a, b in zip((s.shape, s.strains, s.matrices), change)] for sign in (1, -1)
-    ]
-    ways, values = ((f(*ends[0], s) - f(*ends[1], s)) / (2 * STEP) for f in (inputs, outputs))
-    return gaussian.Slopes((np.cumsum(some) - 1)[at], ways, values)
+    ways, values = ((f(high) - f(low)) / (2 * STEP) for f in (inputs, outputs))
+    return Slopes((np.cumsum(some) - 1)[at], ways, values)
 
 
-def in_deviations(slopes, inputs):
+def in_deviations(slopes: Slopes, inputs: np.ndarray) -> np.ndarray:
     """(r, p) Slopes over a standard deviation of the inputs (n, d)."""
     return slopes.in_units(np.maximum(inputs.std(axis=0), 1e-12)).values
 
 
-def told_by_angle(states):
+def told_by_angle(states: States) -> np.ndarray:
     """(n, s) bool: not along the angle near 90 degrees, where what is odd in its cosine is divided by it."""
     return (np.abs(cosine(states.shape)) > SMALLEST_COSINE)[:, None] | (states.directions[:, 0] == 0)
 
 
-def fit_path(states, like=None, again=False, slopes=True):
+def fit_path(
+    states: States, like: FreePath | None = None, again: bool = False, slopes: bool = True
+) -> FreePath:
     """The FreePath of the free states; the leading strain has a metric of its own (measured: a quarter off
     its error)."""
     states = states.loaded
-    co, closing = Coordinates(states.kind), fit_closing(states, like and like.closing.process, again)
+    co = Coordinates(states.kind)
+    closing = fit_closing(states, like.closing.process if like else None, again)
 
-    def inputs(shape, strains, matrices, s):
+    def inputs(s: States) -> np.ndarray:
         with np.errstate(invalid="ignore"):
-            lead = co.leading(strains)
-            return co.path_inputs(shape, lead, s.level, closing.overlap(shape, s.pressure, lead))
+            lead = co.leading(s.strains)
+            return co.path_inputs(s.shape, lead, s.level, closing.overlap(s.shape, s.pressure, lead))
 
-    def outputs(shape, strains, matrices, s):
+    def outputs(s: States) -> np.ndarray:
         with np.errstate(invalid="ignore"):
-            return co.learned_strains(shape, s.pressure, strains)
+            return co.learned_strains(s.shape, s.pressure, s.strains)
 
-    x, y = (
-        inputs(states.shape, states.strains, None, states),
-        outputs(states.shape, states.strains, None, states),
-    )
+    x, y = inputs(states), outputs(states)
     good = np.isfinite(y).all(axis=1)  # the leading strain is larger than 0
     steep = None
     if slopes:
         known = np.isfinite(states.strain_slopes).all(axis=2) & told_by_angle(states)
         steep = slopes_of(states, known, inputs, outputs, good)
         steep = steep.of((np.abs(in_deviations(steep, x[good])) < STEEPEST).all(axis=1))
-    learned = fit_strains(states, good, x, y, steep, like and like.learned, again)
+    learned = fit_strains(states, good, x, y, steep, like.learned if like else None, again)
+    rough, trust = FitSettings(inducing=ROUGH), np.ones((good.sum(), 1))
     start = fit_side_by_side(
-        states.inputs[good], -y[good, :1], states.case[good], np.ones((good.sum(), 1)), (1,), inducing=ROUGH
+        states.inputs[good], -y[good, :1], states.case[good], trust, (1,), settings=rough
     )
     return FreePath(states.kind, closing, learned, start, FURTHEST * float(co.leading(states.strains).max()))
 
 
-def fit_strains(states, good, x, y, slopes=None, like=None, again=False):
+def fit_strains(
+    states: States,
+    good: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    slopes: Slopes | None = None,
+    like: SideBySide | None = None,
+    again: bool = False,
+) -> SideBySide:
     """SideBySide processes of Coordinates.learned_strains y (n, p) at inputs x (n, d) of the States that are
-    `good` (n,), the leading strain's first; slopes: gaussian.Slopes at those; like, again: as for
-    gaussian.fit."""
+    `good` (n,), the leading strain's first; slopes: at those; like, again: as for
+    regression.fit."""
     trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.shape)))
-    settings = {"slopes": slopes, "like": like, "again": again, "inducing": INDUCING}
-    return fit_side_by_side(x[good], y[good], states.case[good], trust[good], (1, y.shape[1] - 1), **settings)
+    data = x[good], y[good], states.case[good], trust[good]
+    settings = FitSettings(inducing=INDUCING, again=again)
+    return fit_side_by_side(*data, (1, y.shape[1] - 1), slopes, like, settings)
 
 
-def fit_closing(states, like=None, again=False):
+def fit_closing(states: States, like: SideBySide | None = None, again: bool = False) -> Closing:
     """The Closing of free states; like: the process of another one."""
     if len(np.unique(states.design[states.touching])) < TELLING:
         return Closing(states.kind, None)
     states = states.of(np.isfinite(states.closing))
     co = Coordinates(states.kind)
-    x, y = (
-        co.closing_inputs(states.shape, co.closing_load(states.pressure, co.leading(states.strains))),
-        states.closing[:, None],
-    )
-    settings = {"like": like, "again": again, "most": MANY, "inducing": CLOSING}
-    return Closing(states.kind, fit_side_by_side(x, y, states.case, np.ones(y.shape), (1,), **settings))
+    x = co.closing_inputs(states.shape, co.closing_load(states.pressure, co.leading(states.strains)))
+    data = x, states.closing[:, None], states.case, np.ones((len(x), 1))
+    settings = FitSettings(most=MANY, inducing=CLOSING, again=again)
+    return Closing(states.kind, fit_side_by_side(*data, (1,), like=like, settings=settings))
 
 
-def fit_stiffness(states, closing, like=None, again=False):
+def fit_stiffness(
+    states: States, closing: Closing, like: FreeStiffness | None = None, again: bool = False
+) -> FreeStiffness:
     """The FreeStiffness of free states whose walls close as the Closing says."""
     co = Coordinates(states.kind)
     y = co.learned_stiffness(states.shape, states.matrices)
     good, touching = np.isfinite(y).all(axis=1), states.touching
     if closing.process is None or len(np.unique(states.design[touching & good])) < TELLING:
-        return FreeStiffness(states.kind, _fit_smooth(states.of(good), like and like.smooth, again), None)
-    smooth = _fit_smooth(states.of(good & ~touching), like and like.smooth, again)
+        return FreeStiffness(states.kind, _fit_smooth(states.of(good), like, again), None)
+    smooth = _fit_smooth(states.of(good & ~touching), like, again)
     states, y = states.of(good & touching), y[good & touching]
     closed = closing.closed(states.shape, states.pressure, states.strains)
     added = (y - smooth(co.stiffness_inputs(states.shape, states.strains, states.level)))[:, order(co)]
-    trust, x = (
-        _trust_in_stiffness(states)[:, order(co)],
-        co.contact_inputs(states.shape, states.strains, closed),
-    )
-    settings = {"like": like and like.contact, "again": again, "noises": CONTACT_NOISES}
-    contact = fit_side_by_side(x, added, states.case, trust, (1, added.shape[1] - 1), **settings)
+    trust = _trust_in_stiffness(states)[:, order(co)]
+    data = co.contact_inputs(states.shape, states.strains, closed), added, states.case, trust
+    known, settings = like.contact if like else None, FitSettings(again=again, noises=CONTACT_NOISES)
+    contact = fit_side_by_side(*data, (1, added.shape[1] - 1), like=known, settings=settings)
     return FreeStiffness(states.kind, smooth, contact)
 
 
 def _trust_in_stiffness(states):
-    """(n, p) trust of gaussian.fit in what is learned of the stiffness: what is odd in the angle's cosine was
-    divided by it."""
+    """(n, p) trust of regression.fit in what is learned of the stiffness: what is odd in the angle's cosine
+    was divided by it."""
     return odd(Coordinates(states.kind).stiffness_parity, np.abs(cosine(states.shape)))
 
 
@@ -167,31 +180,29 @@ def _fit_smooth(states, like, again):
     """Gaussian process of Coordinates.learned_stiffness, by slopes too where walls do not touch."""
     co = Coordinates(states.kind)
 
-    def inputs(shape, strains, matrices, s):
-        return co.stiffness_inputs(shape, strains, s.level)
+    def inputs(s: States) -> np.ndarray:
+        return co.stiffness_inputs(s.shape, s.strains, s.level)
 
-    def outputs(shape, strains, matrices, s):
-        return co.learned_stiffness(shape, matrices)
+    def outputs(s: States) -> np.ndarray:
+        return co.learned_stiffness(s.shape, s.matrices)
 
-    x, y = (
-        inputs(states.shape, states.strains, None, states),
-        outputs(states.shape, None, states.matrices, states),
-    )
+    x, y = inputs(states), outputs(states)
     known = (
         np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states) & ~states.touching[:, None]
     )
     steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
     steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
-    settings = {"like": like, "again": again, "inducing": OF_STIFFNESS}
-    return fit_side_by_side(x, y, states.case, _trust_in_stiffness(states), (y.shape[1],), steep, **settings)
+    data = x, y, states.case, _trust_in_stiffness(states)
+    settings = FitSettings(inducing=OF_STIFFNESS, again=again)
+    return fit_side_by_side(*data, (y.shape[1],), steep, like.smooth if like else None, settings)
 
 
-def fit_kind(sample, like=None, again=True):
+def fit_kind(sample: Sample, like: KindLaw | None = None, again: bool = True) -> KindLaw:
     """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts,
     or, unless `again`, which are taken as they are."""
     states, around = sample.free, sample.around
-    path = fit_path(states, like and like.path, again=again)
-    stiffness = fit_stiffness(states, path.closing, like and like.stiffness, again=again)
+    path = fit_path(states, like.path if like else None, again)
+    stiffness = fit_stiffness(states, path.closing, like.stiffness if like else None, again)
     co = Coordinates(states.kind)
     closed = path.closing.closed(around.shape, around.pressure, around.strains)
     x = co.around_inputs(around.shape, around.strains, closed)

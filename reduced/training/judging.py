@@ -9,35 +9,41 @@ from dataclasses import replace
 import numpy as np
 
 from pneunet.base.se3 import exp_pose
+from pneunet.base.strains import RodStrains
 from pneunet.reduced.trained.enthalpy import anharmonic_gradient, whitening
+from pneunet.reduced.trained.law import KindLaw
+from pneunet.reduced.training.states import Sample, States
+
+Figures = dict[str, float]
+#: name -> of each state
+Misses = dict[str, np.ndarray]
 
 #: mm; of the free segment whose tip is compared
 TIP_LENGTH = 100.0
-#: mm; normal pitch of the segments that stand for shape numbers
+#: mm; normal pitch of the segments that stand for shape numbers; and of each strain its unit of length
 PITCH = 5.0
+UNITS = np.array([1, 1, 1, PITCH, PITCH, PITCH])
 
 
-def strain_error(states, strains):
+def strain_error(states: States, strains: np.ndarray) -> np.ndarray:
     """(n,) norm of the error over the norm of the free strains at top pressure."""
     return np.linalg.norm(strains - states.strains, axis=1) / states.size
 
 
-def tip_error(states, strains):
+def tip_error(states: States, strains: np.ndarray) -> np.ndarray:
     """(n,) distance of the tips of free segments of TIP_LENGTH, at normal pitch PITCH, over that length."""
-    scale = np.array([PITCH, PITCH, PITCH, 1, 1, 1]) ** -1.0
-    tips = [
-        exp_pose(TIP_LENGTH * q[:, [3, 4, 5, 0, 1, 2]] * scale)[:, :3, 3] for q in (states.strains, strains)
-    ]
+    twists = (RodStrains.of_vector(q / UNITS).twist_vector for q in (states.strains, strains))
+    tips = [exp_pose(TIP_LENGTH * twist)[:, :3, 3] for twist in twists]
     return np.linalg.norm(tips[1] - tips[0], axis=1) / TIP_LENGTH
 
 
-def stiffness_error(states, K):
+def stiffness_error(states: States, K: np.ndarray) -> np.ndarray:
     """(n,) largest |1 - eigenvalue| of K_FE^-1 K."""
     values = np.linalg.eigvals(np.linalg.solve(states.matrices, K)).real
     return np.abs(values - 1).max(axis=1)
 
 
-def force_error(law, sample):
+def force_error(law: KindLaw, sample: Sample) -> np.ndarray:
     """(m,) norm of the force error over that of the force, whitened by the stiffness; law alone, its free
     states included."""
     f = sample.around
@@ -56,18 +62,19 @@ def force_error(law, sample):
     return np.linalg.norm(white[0], axis=1) / np.linalg.norm(white[1], axis=1)
 
 
-def symmetric(K):
+def symmetric(K: np.ndarray) -> np.ndarray:
+    """The symmetric parts of matrices (n, 6, 6)."""
     return (K + np.swapaxes(K, 1, 2)) / 2
 
 
-def within(law, states):
+def within(law: KindLaw, states: States) -> np.ndarray:
     """(n, p) bool: whether strains that are not zero by symmetry lie within their 90 % intervals."""
     half = law.half_width(states.shape, states.pressure)
     inside = np.abs(law.free_strains(states.shape, states.pressure) - states.strains) <= half
     return inside[:, law.quantile > 0]
 
 
-def misses(law, sample):
+def misses(law: KindLaw, sample: Sample) -> Misses:
     """{name: array} of a law's errors on a Sample that it has not seen."""
     law, sample = replace(law, level=0), sample.on(0)
     loaded = sample.free.loaded
@@ -85,7 +92,7 @@ def misses(law, sample):
     }
 
 
-def figures(found):
+def figures(found: list[Misses]) -> Figures:
     """{figure: number} of a list of `misses`; nan where no state says."""
     m = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
 
@@ -103,7 +110,7 @@ def figures(found):
     }
 
 
-def finest_mesh(law, held_out):
+def finest_mesh(law: KindLaw, held_out: Sample) -> Figures:
     """{figure: number} of the free strains on the finest of several meshes with the law as it is, which is
     for that mesh."""
     fine = held_out.free.of(held_out.free.level == law.level).loaded
@@ -117,7 +124,7 @@ def finest_mesh(law, held_out):
     }
 
 
-def further_angles(found):
+def further_angles(found: list[tuple[np.ndarray, Misses]]) -> Figures:
     """{figure: number} of the free states of designs more slanted than the held-out ones; found: [(their
     numbers, `misses`)]."""
     if not found:

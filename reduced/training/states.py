@@ -1,11 +1,11 @@
 """The states of a data set that a law is trained on and judged by, and how designs are kept apart for the
 judging."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from pneunet.base.files.dataset import full_matrices
+from pneunet.base.files.dataset import CellData, full_matrices
 from pneunet.reduced.trained.coordinates import REST, Coordinates
 
 #: held-out designs that suffice to judge a law; with fewer the training designs are judged too, by laws that
@@ -43,23 +43,23 @@ class States:
     matrix_slopes: np.ndarray
     directions: np.ndarray
 
-    def of(self, chosen):
-        return States(
-            self.kind, *(getattr(self, f.name)[chosen] for f in fields(self)[1:-1]), self.directions
-        )
+    def of(self, chosen: np.ndarray) -> "States":
+        """Those that are chosen, by rows or by (n,) bool."""
+        return replace(self, **{f.name: getattr(self, f.name)[chosen] for f in fields(self)[1:-1]})
 
     @property
-    def loaded(self):
+    def loaded(self) -> "States":
         """Those with pressure."""
         return self.of(self.pressure > 0)
 
     @property
-    def case(self):
+    def case(self) -> np.ndarray:
         """(n,) equal for the states of one design on one mesh."""
         return self.design * (1 + self.level.max(initial=0)) + self.level
 
     @property
-    def inputs(self):
+    def inputs(self) -> np.ndarray:
+        """(n, d) Coordinates.inputs."""
         return Coordinates(self.kind).inputs(self.shape, self.pressure, self.level)
 
 
@@ -75,17 +75,17 @@ class Sample:
     forces: np.ndarray
     drawn: float = np.inf
 
-    def of(self, designs):
+    def of(self, designs: np.ndarray) -> "Sample":
         """Those of the designs with these numbers."""
         held = np.isin(self.around.design, designs)
         return self._with(self.free.of(np.isin(self.free.design, designs)), held)
 
-    def on(self, level):
+    def on(self, level: int) -> "Sample":
         """Those on one mesh."""
         held = self.around.level == level
         return self._with(self.free.of(self.free.level == level), held)
 
-    def on_common_meshes(self):
+    def on_common_meshes(self) -> "Sample":
         """Those on the coarsest mesh and on others that at least COMMON designs are computed on."""
         free, held = self.free, self.around
         rare = [
@@ -100,17 +100,18 @@ class Sample:
         return Sample(free, self.around.of(held), self.change[held], self.forces[held], self.drawn)
 
     @property
-    def doubled(self):
+    def doubled(self) -> np.ndarray:
         """(m,) bool: prescribed are twice the free strains, others than those went in some direction."""
         free = self.around.strains - REST
         return np.linalg.norm(self.change - free, axis=1) < 1e-3 * np.linalg.norm(free, axis=1)
 
     @property
-    def designs(self):
+    def designs(self) -> np.ndarray:
+        """Their numbers, each once."""
         return np.unique(self.free.design)
 
 
-def sample_of(data, kind, held_out):
+def sample_of(data: CellData, kind: str, held_out: bool) -> Sample:
     """The Sample of a kind's accepted cases in CellData, of the held-out designs or of all others."""
     k = data.about["kinds"].index(kind)
     cases = data.accepted & (data.kind == k) & (data.held_out == held_out)
@@ -130,15 +131,10 @@ def sample_of(data, kind, held_out):
     at = {(data.case[i], round(float(data.pressure[i]), 6)): n for n, i in enumerate(free)}
     states = States(
         kind,
-        *(
-            a.astype(float)
-            for a in (
-                data.shape[data.case[free]],
-                data.pressure[free],
-                data.strains[free],
-                data.matrices[free],
-            )
-        ),
+        data.shape[data.case[free]].astype(float),
+        data.pressure[free].astype(float),
+        data.strains[free].astype(float),
+        data.matrices[free].astype(float),
         data.design[data.case[free]],
         level[data.mesh[data.case[free]]],
         np.array([top[data.case[i]] for i in free]),
@@ -177,13 +173,13 @@ def _closing(data, rows, coordinates):
             return
 
 
-def folds(designs, parts):
+def folds(designs: np.ndarray, parts: int) -> list[np.ndarray]:
     """[numbers of one part] of designs, dealt out at random, the same for the same designs."""
     part = np.random.default_rng(0).permutation(len(designs)) % parts
     return [designs[part == f] for f in range(parts)]
 
 
-def splits(training, held_out):
+def splits(training: Sample, held_out: Sample) -> list[tuple[Sample, Sample]]:
     """[(what a law learns from, what it is judged on)] of two Samples: as they are, and where the held-out
     designs are too few also by PARTS of those training designs that were drawn as they were."""
     pairs = [(training, held_out)]

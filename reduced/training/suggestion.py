@@ -11,13 +11,22 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from pneunet.base.errors import InputError
+from pneunet.reduced.trained.gaussian import GaussianProcess
+from pneunet.reduced.trained.law import KindLaw
 
 #: free states of a design that may have walls in touch, at equal pressures up to its top one
 LEVELS = 8
 TOO_FEW = "{} designs are asked for, {} are on offer: offer more"
 
 
-def most_telling(law, shape, count, top_pressure, limit_share, touching=False):
+def most_telling(
+    law: KindLaw,
+    shape: np.ndarray,
+    count: int,
+    top_pressure: float,
+    limit_share: float,
+    touching: bool = False,
+) -> np.ndarray:
     """(count,) rows of shape numbers (n, 13) whose designs a KindLaw would learn most from, the most telling
     first.
 
@@ -36,11 +45,8 @@ def most_telling(law, shape, count, top_pressure, limit_share, touching=False):
         process = law.stiffness.contact.processes[0]
         design, inputs = _touching(law, shape, pressure)
     else:
-        process, design, inputs = (
-            law.path.learned.processes[0],
-            np.arange(len(shape)),
-            law.path.at(shape, pressure, 0)[-1],
-        )
+        process, design = law.path.learned.processes[0], np.arange(len(shape))
+        inputs = law.path.at(shape, pressure, 0)[-1]
     blocks = [np.flatnonzero(design == number) for number in np.unique(design)]
     if len(blocks) < count:
         raise InputError(TOO_FEW.format(count, f"{len(blocks)} whose walls touch"))
@@ -58,20 +64,21 @@ def _touching(law, shape, top):
     return design[met], law.coordinates.contact_inputs(shape[met], strains[met], closed[met])
 
 
-def greedy(process, inputs, blocks, count):
+def greedy(process: GaussianProcess, inputs: np.ndarray, blocks: list[np.ndarray], count: int) -> list[int]:
     """`count` of the blocks (lists of rows of inputs), each the one that lowers the process's weighed
     variance most."""
     unknown = process.covariance(inputs)
     weight = np.diag(unknown).copy()
     for block in blocks:
         weight[block] /= len(block)  # every design counts alike
-    chosen, left = [], dict(enumerate(blocks))
+    chosen: list[int] = []
+    left = dict(enumerate(blocks))
     while len(chosen) < count:
         gains = {
             number: (weight * (_whitened(process, unknown, block) ** 2).sum(axis=0)).sum()
             for number, block in left.items()
         }
-        best = max(gains, key=gains.get)
+        best = max(gains, key=lambda number: gains[number])
         told = _whitened(process, unknown, left.pop(best))
         unknown -= told.T @ told
         chosen.append(best)

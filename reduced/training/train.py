@@ -7,7 +7,9 @@ noise anew.
 """
 
 import hashlib
+import logging
 import time
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,46 +17,59 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
-from pneunet.base.files.dataset import read_dataset
-from pneunet.reduced.trained.law import RodLaw, read_law, write_law
+from pneunet.base.files.dataset import CellData, read_dataset
+from pneunet.reduced.trained.file import read_law, write_law
+from pneunet.reduced.trained.law import KindLaw, TrainedLaw
 from pneunet.reduced.training.comparing import compare_laws, curve_table, law_table, learning_curve
 from pneunet.reduced.training.fit import FOLDS, fit_kind, fit_path, fit_stiffness
-from pneunet.reduced.training.judging import figures, finest_mesh, further_angles, misses
-from pneunet.reduced.training.states import folds, sample_of, splits
+from pneunet.reduced.training.judging import Figures, Misses, figures, finest_mesh, further_angles, misses
+from pneunet.reduced.training.states import Sample, folds, sample_of, splits
+
+log = logging.getLogger(__name__)
+
+#: as the built-in one
+Map = Callable[[Callable, Iterable], Iterable]
+#: kind -> (training Sample, held-out Sample)
+Samples = dict[str, tuple[Sample, Sample]]
 
 #: of `designs_at_further_angles`: parts, and the least degrees that they lie further out
 FURTHER_PARTS, FURTHER_BY = 5, 1.0
 
 
-def samples_of(data, say=lambda text: None):
+def samples_of(data: CellData) -> Samples:
     """{kind: (training Sample, held-out Sample)} of the kinds of which there are enough; InputError where
     there is none."""
     out = {}
     for kind in data.about["kinds"]:
-        pair = training, held_out = tuple(sample_of(data, kind, held) for held in (False, True))
-        designs, held = (len(sample.designs) for sample in pair)
+        training, held_out = (sample_of(data, kind, held) for held in (False, True))
+        designs, held = len(training.designs), len(held_out.designs)
         text = f"{kind}: {designs} designs to train on, {held} held out"
         if designs < 2 * FOLDS or not held or not len(training.forces):
-            say(f"{text}: too few, or no prescribed states: the law will not know this kind")
+            log.info(f"{text}: too few, or no prescribed states: the law will not know this kind")
             continue
-        say(text)
+        log.info(text)
         common = training.on_common_meshes()
         if common.free.level.max() < training.free.level.max():
-            say(f"{kind}: too few designs on the finest mesh: the law is one of the coarser mesh")
+            log.info(f"{kind}: too few designs on the finest mesh: the law is one of the coarser mesh")
         out[kind] = common, held_out
     if not out:
         raise InputError(f"too few accepted designs of any kind to train on ({text})")
     return out
 
 
-def digest(path):
+def digest(path: str | Path) -> str:
     """What a law knows its data set again by."""
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
-def run_training(path, out, say=print, compare=True, mapping=map, like=None):
-    """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables. Returns
-    the RodLaw.
+def run_training(
+    path: Path,
+    out: Path,
+    compare: bool = True,
+    mapping: Map = map,
+    like: Path | None = None,
+) -> TrainedLaw:
+    """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables.
 
     mapping: a `map`, over processes for instance; what it computes side by side does not depend on how many
     there are. like: file of a law whose metrics and noises are taken as they are.
@@ -62,20 +77,18 @@ def run_training(path, out, say=print, compare=True, mapping=map, like=None):
     data, started = read_dataset(path), time.perf_counter()
     known, about = (read_law(like).kinds, {"like_sha256": digest(like)}) if like else ({}, {})
     try:
-        samples = samples_of(data, say)
+        samples = samples_of(data)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    jobs = [(fit_kind, (training, known.get(kind), False)) for kind, (training, _) in samples.items()]
+    jobs: list[tuple[Callable, tuple]] = [
+        (fit_kind, (training, known.get(kind), False)) for kind, (training, _) in samples.items()
+    ]
     if compare:
         jobs += [(job, pair) for pair in samples.values() for job in (compare_laws, learning_curve)]
-    done = list(_shown(mapping(_do, jobs), len(jobs), "trained", say))
+    done = list(_shown(mapping(_do, jobs), len(jobs), "trained"))
     laws, tables = dict(zip(samples, done)), iter(done[len(samples) :])
-    judged = judge(laws, samples, mapping, say)
-    lines, held_out, compared = (
-        [f"# The trained law of {Path(path).name}"],
-        held_out_figures(laws, samples),
-        {},
-    )
+    judged = judge(laws, samples, mapping)
+    lines, compared = [f"# The trained law of {Path(path).name}"], {}
     for kind, pair in samples.items():
         lines += ["", f"## {kind}", "", judged_on(*pair), "", "| figure | value |", "|---|---|"]
         lines += [f"| {name} | {value:.4f} |" for name, value in judged[kind].items()]
@@ -83,12 +96,14 @@ def run_training(path, out, say=print, compare=True, mapping=map, like=None):
             compared[kind] = {"laws": next(tables), "learning curve": next(tables)}
             lines += [*law_table(compared[kind]["laws"]), *curve_table(compared[kind]["learning curve"])]
     about |= {"data": Path(path).name, "data_sha256": digest(path), "revisions": data.about["revisions"]}
-    law = RodLaw(laws, about | {"figures": judged, "held_out": held_out, "compared": compared})
+    law = TrainedLaw(
+        laws, about | {"figures": judged, "held_out": held_out_figures(laws, samples), "compared": compared}
+    )
     write_law(out, law)
     write_text(Path(out).with_suffix(".md"), "\n".join(lines) + "\n")
     for line in lines:
-        say(line)
-    say(f"law in {out}, tables in {Path(out).with_suffix('.md')}; {time.perf_counter() - started:.0f} s")
+        log.info(line)
+    log.info(f"law in {out}, tables in {Path(out).with_suffix('.md')}; {time.perf_counter() - started:.0f} s")
     return law
 
 
@@ -97,19 +112,19 @@ def _do(job):
     return function(*arguments)
 
 
-def held_out_figures(laws, samples):
+def held_out_figures(laws: dict[str, KindLaw], samples: Samples) -> dict[str, Figures]:
     """{kind: {figure: number}} of KindLaws on the held-out designs alone."""
     return {kind: figures([misses(law, samples[kind][1])]) for kind, law in laws.items()}
 
 
-def _shown(results, count, what, say):
+def _shown(results: Iterable, count: int, what: str) -> Iterator:
     """The results as they come, each told."""
     for number, result in enumerate(results, start=1):
-        say(f"{number}/{count} {what}")
+        log.info(f"{number}/{count} {what}")
         yield result
 
 
-def judge(laws, samples, mapping=map, say=lambda text: None):
+def judge(laws: dict[str, KindLaw], samples: Samples, mapping: Map = map) -> dict[str, Figures]:
     """{kind: {figure: number}} of KindLaws on the designs that neither they nor, where those are few, laws of
     parts have seen; and of the designs at further angles, as `designs_at_further_angles` gives them."""
     jobs = []
@@ -119,7 +134,7 @@ def judge(laws, samples, mapping=map, say=lambda text: None):
         jobs += [
             (judge_free_states_again, (law, *part)) for part in designs_at_further_angles(*samples[kind])
         ]
-    done = iter(list(_shown(mapping(_do, jobs), len(jobs), "judged", say)))
+    done = iter(list(_shown(mapping(_do, jobs), len(jobs), "judged")))
     out = {}
     for kind, law in laws.items():
         found = [next(done) for _ in splits(*samples[kind])]
@@ -128,19 +143,19 @@ def judge(laws, samples, mapping=map, say=lambda text: None):
     return out
 
 
-def judge_again(law, learned, judged):
+def judge_again(law: KindLaw, learned: Sample, judged: Sample) -> Misses:
     """`misses` on a Sample of the law that another Sample gives."""
     return misses(fit_kind(learned, law), judged)
 
 
-def judge_free_states_again(law, learned, judged):
+def judge_free_states_again(law: KindLaw, learned: Sample, judged: Sample) -> Misses:
     """The same of the free states alone, with the law's own metrics."""
     path = fit_path(learned.free, law.path)
     stiffness = fit_stiffness(learned.free, path.closing, law.stiffness)
     return misses(replace(law, path=path, stiffness=stiffness), judged)
 
 
-def designs_at_further_angles(training, held_out):
+def designs_at_further_angles(training: Sample, held_out: Sample) -> list[tuple[Sample, Sample]]:
     """[(what a law learns from, what it is judged on)]: the training designs that are clearly more slanted
     than any held-out one, as edge designs may be, in parts; [] where they are few."""
     slant, most = (np.abs(90 - sample.free.shape[:, 0]) for sample in (training, held_out))
@@ -149,7 +164,7 @@ def designs_at_further_angles(training, held_out):
     return [(training.of(np.setdiff1d(training.designs, part)), training.of(part)) for part in parts]
 
 
-def judged_on(training, held_out):
+def judged_on(training: Sample, held_out: Sample) -> str:
     """A sentence on which designs the figures are about."""
     designs, held = len(training.designs), len(held_out.designs)
     text = f"{designs} designs to train on, {held} held out."

@@ -2,7 +2,9 @@
 
 import json
 import os
+import subprocess
 import sys
+from importlib.metadata import version
 
 import numpy as np
 
@@ -20,6 +22,21 @@ def test_record_holds_how_and_what(tmp_path, monkeypatch):
     assert read["date"].endswith("Z") and read["revision"]
 
 
-def test_revision_without_git_is_unknown(monkeypatch):
-    monkeypatch.setenv("PATH", "/nowhere")
-    assert record.revision() == "unknown"
+def test_revision_is_the_checkouts_commit(monkeypatch):
+    line = ["git", "describe", "--always", "--dirty", "--abbrev=12"]
+    expected = subprocess.run(line, cwd=record.ROOT, capture_output=True, text=True)
+    if expected.returncode == 0 and (record.ROOT / ".git").exists():
+        assert record.revision() == expected.stdout.strip()
+    monkeypatch.setenv("PATH", "/nowhere")  # no git
+    assert record.revision() == version("pneunet")
+
+
+def test_revision_of_installed_code_is_not_that_of_somebody_elses_repository(tmp_path, monkeypatch):
+    """Nor is that of a copy without a history of its own."""
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    for root in (tmp_path / "lib" / "site-packages", tmp_path, tmp_path / "copy"):
+        root.mkdir(parents=True, exist_ok=True)
+        monkeypatch.setattr(record, "ROOT", root)
+        assert record.revision() == version("pneunet")
+        (tmp_path / "copy").mkdir(exist_ok=True)
+        (tmp_path / "copy" / "pyproject.toml").write_text("")

@@ -78,6 +78,15 @@ def test_straight_and_plane_lines_have_no_helix():
     assert arc.helix_cylinder_curvature == pytest.approx(0.02)
 
 
+def test_six_numbers_and_mirror_images():
+    e, k = (np.array(column) for column in zip(*SCREWS))
+    strains = RodStrains.of_vector(np.hstack([e, k]))
+    assert (strains.e == e).all() and (strains.k == k).all() and strains.vector.shape == (3, 6)
+    flip = np.diag([1.0, -1.0, 1.0, 1.0])
+    image = flip @ se3.exp_pose(strains.twist_vector) @ flip
+    assert image == pytest.approx(se3.exp_pose(strains.mirrored.twist_vector), abs=1e-14)
+
+
 def test_strains_of_a_relative_pose_for_many_segments_at_once():
     e, k = (np.array(column) for column in zip(*SCREWS))
     lengths = np.array([5.0, 8.0, 40.0])

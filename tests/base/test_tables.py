@@ -7,22 +7,19 @@ import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import from_table, quantity, read_toml, refuse_unknown, to_table, toml_text
+from pneunet.base.files.toml import from_table, read_toml, refuse_unknown, to_table, toml_text
 from pneunet.base.materials.laws import PAPER_HELICAL, NeoHookean, material_from_table, material_to_table
+from pneunet.base.quantities import Checked, quantity
 
 
 @dataclass(frozen=True)
-class Tube:
+class Tube(Checked):
     angle: float = quantity("deg", note="of the fibres")
-    radius: float = quantity("mm", 3.0, "inner")
+    radius: float = quantity("mm", 3.0, "inner", above=0)
     pressure: float = quantity("kPa", 0.02)
     fibres: int = quantity(None, 4)
     label: str = quantity(None, "a tube")
     law: object = None
-
-    def __post_init__(self):
-        if self.radius <= 0:
-            raise InputError("radius_mm must be larger than 0")
 
 
 def test_nested_tables_read_back():
@@ -82,7 +79,7 @@ def test_dataclass_reads_back_in_internal_units():
         ({"angle_deg": True}, "file: 'angle_deg' must be a finite number, not True"),
         ({"angle_deg": 1, "fibres": 2.5}, "file: 'fibres' must be a whole number, not 2.5"),
         ({"angle_deg": 1, "label": 5}, "file: 'label' must be text in quotes, not 5"),
-        ({"angle_deg": 1, "radius_mm": -1}, "file: radius_mm must be larger than 0"),
+        ({"angle_deg": 1, "radius_mm": -1}, "file: radius_mm = -1 must be larger than 0"),
         ([1, 2], "file: must be a table of keys, not [1, 2]"),
     ],
 )

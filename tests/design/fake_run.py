@@ -6,10 +6,11 @@ import json
 import numpy as np
 
 from pneunet.base.files.atomic import write_csv
+from pneunet.base.files.schemas import CENTRELINE, CENTRELINES, SEGMENTS, STEPS, TARGET, WALLS
 from pneunet.base.strains import RodStrains
-from pneunet.geometry.designfile import Design, body_tables, write_design
+from pneunet.geometry.designfile import DesignFile, body_tables, write_design_file
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.model import AnalyticModel, predict
+from pneunet.reduced import AnalyticLaw, predict
 
 FACTOR = 0.8
 POSE = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, -3.0], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
@@ -18,12 +19,12 @@ HELIX = Segment("one-sided", 60.0, 9, gap=1.5)
 PLANE = Segment("one-sided", 90.0, 4, gap=1.5)
 
 
-class Scaled(AnalyticModel):
+class Scaled(AnalyticLaw):
     """FACTOR times the analytic model's strains."""
 
     def strains(self, segment, pressure):
-        rest, s = RodStrains.unstrained(), super().strains(segment, pressure)
-        return RodStrains(rest.e + FACTOR * (s.e - rest.e), FACTOR * s.k)
+        rest = RodStrains.unstrained().vector
+        return RodStrains.of_vector(rest + FACTOR * (super().strains(segment, pressure).vector - rest))
 
 
 def make_run(
@@ -38,16 +39,14 @@ def make_run(
 ):
     """Fill `directory`; the solve ends at `reached` times the pressure (MPa), one gap overlaps by `overlap`
     mm there, with `contact` as a contact model's penetration."""
-    manipulator, model = Manipulator(segments), AnalyticModel()
-    design = Design(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
+    manipulator, model = Manipulator(segments), AnalyticLaw()
+    design = DesignFile(manipulator, pressure, name="test arm", base_pose=POSE, target="target.csv")
     directory.mkdir(parents=True, exist_ok=True)
-    write_design(directory / "design.toml", design)
+    write_design_file(directory / "design.toml", design)
     line = predict(manipulator, pressure, model, base_pose=POSE)
     wave = np.column_stack([np.zeros_like(line.s), np.zeros_like(line.s), 1.5 * (1 - np.cos(line.s / 20.0))])
-    write_csv(directory / "target.csv", ["x_mm", "y_mm", "z_mm"], line.points + wave)
-    write_csv(
-        directory / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"], np.column_stack([line.s, line.points])
-    )
+    write_csv(directory / "target.csv", TARGET, line.points + wave)
+    write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
     record = {"command": "pneunet design target.csv", "revision": "abc", "inputs": {"law": "analytic"}}
     (directory / "run.json").write_text(json.dumps(record))
     if not solve:
@@ -71,10 +70,11 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
         )
         work = (4, 2) if n else (0, 0)
         steps.append(
-            [n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 1 + 5 * p, 1.5 * n]
+            [n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 0, 1 + 5 * p]
+            + [0, 0, 0, 1.5 * n]
         )
-        centrelines += [[n, p * 1e3, s, *point] for s, point in zip(line.s, line.points)]
-        segments += [[n, p * 1e3, i + 1, *one.e, *one.k] for i, one in enumerate(each)]
+        centrelines += [[n, p * 1e3, s, *point, 0, 0] for s, point in zip(line.s, line.points)]
+        segments += [[n, p * 1e3, i + 1, *one.vector, 0, 0] for i, one in enumerate(each)]
     walls = [
         [i + 1, "top" if side > 0 else "bottom", gap, s.gap, s.gap * (0.4 + 0.5 * gap / s.chambers)]
         for i, s in enumerate(manipulator.segments)
@@ -84,35 +84,10 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
     if overlap:
         walls[0][4] = -overlap
         steps[-1][8:10] = -overlap, int(not contact)
-    write_csv(
-        folder / "steps.csv",
-        [
-            "step",
-            "pressure_kPa",
-            "iterations",
-            "factorisations",
-            "volume_mm3",
-            "tip_x_mm",
-            "tip_y_mm",
-            "tip_z_mm",
-            "smallest_wall_distance_mm",
-            "walls_overlap",
-            "body_distance_mm",
-            "body_overlap",
-            "largest_stretch",
-            "seconds",
-        ],
-        steps,
-    )
-    write_csv(
-        folder / "centrelines.csv", ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"], centrelines
-    )
-    write_csv(
-        folder / "segments.csv",
-        ["step", "pressure_kPa", "segment", "e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm"],
-        segments,
-    )
-    write_csv(folder / "walls.csv", ["segment", "side", "gap", "gap_mm", "distance_mm"], walls)
+    for name, columns, rows in (("steps", STEPS, steps), ("centrelines", CENTRELINES, centrelines)):
+        write_csv(folder / f"{name}.csv", columns, rows)
+    write_csv(folder / "segments.csv", SEGMENTS, segments)
+    write_csv(folder / "walls.csv", WALLS, walls)
     (folder / "run.json").write_text(
         json.dumps(
             {

@@ -5,7 +5,7 @@ import pytest
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
-from pneunet.design.search.inverse import solve
+from pneunet.design.search.inverse import search
 from pneunet.design.search.lookup import count_for
 from pneunet.design.search.problem import EQ27
 from pneunet.design.search.space import Variable
@@ -13,7 +13,7 @@ from pneunet.design.target.extraction import extract
 from pneunet.design.target.metrics import compare
 from pneunet.design.target.target import Piece, Target
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.model import predict
+from pneunet.reduced import predict
 from tests.design.toy_law import ToyLaw
 
 TWISTING = Segment("twisting", 65.0, 7, gap=2.2, cavity_floor=0.5, chamber_height=5.5)
@@ -36,7 +36,7 @@ def made(segments, pressure=0.04, pose=None):
 
 def designed(target, objective="paired", law=None):
     law = law or ToyLaw()
-    solution = solve(target, extract(target, target.pieces), law, objective, say=lambda text: None)
+    solution = search(target, extract(target, target.pieces), law, objective)
     line = predict(solution.manipulator, solution.pressure, law, 0.5, solution.base_pose)
     return solution, compare(line.points, target.points), line
 

@@ -1,17 +1,18 @@
 import numpy as np
 import pytest
 
+from pneunet.base.curve import Curve
 from pneunet.design.target.metrics import compare, eq27, hausdorff, paired_rms
 
 
 def line(length, offset=0.0, n=50):
     x = np.linspace(0, length, n)
-    return np.column_stack([x, np.full(n, offset), np.zeros(n)])
+    return Curve(np.column_stack([x, np.full(n, offset), np.zeros(n)]))
 
 
 def circle(radius, n=4001):
     t = np.linspace(0, 2 * np.pi, n)
-    return radius * np.column_stack([np.cos(t), np.sin(t), 0 * t])
+    return Curve(radius * np.column_stack([np.cos(t), np.sin(t), 0 * t]))
 
 
 def test_parallel_lines_differ_by_their_offset_in_every_way():
@@ -28,8 +29,8 @@ def test_parallel_lines_differ_by_their_offset_in_every_way():
 def test_concentric_circles():
     a, b = circle(20), circle(25)
     assert paired_rms(a, b) == pytest.approx(5, rel=1e-6)
-    assert hausdorff(a[::4], b[::4]) == pytest.approx(5, rel=1e-4)
-    assert compare(b[::4], a[::4]).length_mismatch == pytest.approx(2 * np.pi * 5, rel=1e-4)
+    assert hausdorff(Curve(a.points[::4]), Curve(b.points[::4])) == pytest.approx(5, rel=1e-4)
+    assert compare(b.points[::4], a.points[::4]).length_mismatch == pytest.approx(2 * np.pi * 5, rel=1e-4)
 
 
 def test_a_curve_that_is_too_long_lowers_neither_rms_nor_hausdorff_though_eq27_is_blind_to_it():
@@ -42,9 +43,9 @@ def test_a_curve_that_is_too_long_lowers_neither_rms_nor_hausdorff_though_eq27_i
 
 
 def test_hausdorff_sees_both_sides():
-    spike = np.array([[0, 0, 0], [50, 0, 0], [50, 8, 0], [50, 0, 0], [100, 0, 0.0]])
+    spike = Curve([[0, 0, 0], [50, 0, 0], [50, 8, 0], [50, 0, 0], [100, 0, 0.0]])
     assert hausdorff(spike, line(100)) == hausdorff(line(100), spike) == pytest.approx(8)
 
 
 def test_distances_are_to_segments_not_to_vertices():
-    assert eq27(np.array([[50.0, 2.0, 0.0]]), np.array([[0, 0, 0], [100, 0, 0.0]])) == pytest.approx(4)
+    assert eq27(np.array([[50.0, 2.0, 0.0]]), Curve([[0, 0, 0], [100, 0, 0.0]])) == pytest.approx(4)

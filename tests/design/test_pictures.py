@@ -8,9 +8,9 @@ from pneunet.base.files.atomic import read_columns
 from pneunet.design.report.dimensions import spread
 from pneunet.design.report.drawing import chamber_plan, section_groups, segment_table
 from pneunet.design.report.labels import plain, segment_name, significant
-from pneunet.geometry.designfile import Design
+from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.model import AnalyticModel
+from pneunet.reduced import AnalyticLaw
 from tests.design.fake_run import HELIX, PLANE, POSE, TWIST, make_run
 
 
@@ -68,7 +68,7 @@ def test_drawing_keeps_every_text_on_the_sheet_and_apart(segments):
 
     from pneunet.design.report.drawing import drawing_figure
 
-    figure = drawing_figure(Design(Manipulator(segments), 0.05, name="arm"))
+    figure = drawing_figure(DesignFile(Manipulator(segments), 0.05, name="arm"))
     renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw(renderer)
     sheet = figure.bbox
@@ -119,12 +119,13 @@ def test_rendered_scale_is_the_views_scale():
 
 def test_design_picture(tmp_path):
     pytest.importorskip("matplotlib")
-    from pneunet.design.report.pictures import draw_design
+    from pneunet.design.design import Design
 
     make_run(tmp_path, solve=False)
-    assert draw_design(tmp_path).stat().st_size > 20_000
-    (tmp_path / "target.csv").unlink()
-    draw_design(tmp_path)
+    for picture in ("with.png", "without.png"):
+        assert Design.read(tmp_path).draw(tmp_path / picture)
+        assert (tmp_path / picture).stat().st_size > 20_000
+        (tmp_path / "target.csv").unlink(missing_ok=True)
 
 
 def test_shape_files(tmp_path):
@@ -132,7 +133,7 @@ def test_shape_files(tmp_path):
     from pneunet.design.shape import run_shape
 
     make_run(tmp_path, solve=False)
-    folder = run_shape(tmp_path / "design.toml", [0.02, 0.01], tmp_path, lambda text: None, AnalyticModel())
+    folder = run_shape(tmp_path / "design.toml", [20.0, 10.0], tmp_path, AnalyticLaw())
     rows = read_columns(folder / "centrelines.csv", ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"])
     at_design = rows[rows[:, 0] == 20.0][:, 1:]
     assert at_design == pytest.approx(
@@ -145,7 +146,7 @@ def test_shape_files(tmp_path):
     assert (folder / "inflation.gif").stat().st_size < 3e6
 
 
-class Limited(AnalyticModel):
+class Limited(AnalyticLaw):
     """A law that has no solution above 15 kPa."""
 
     name = "limited"
@@ -162,7 +163,7 @@ def test_shape_beyond_the_limit_keeps_and_names_the_rest(tmp_path):
 
     make_run(tmp_path, (PLANE,), pressure=0.01, solve=False)
     with pytest.raises(ConvergenceError, match=r"no shape at 20 kPa.*kept in .*: 10 kPa"):
-        run_shape(tmp_path / "design.toml", [0.01, 0.02], tmp_path, say=lambda text: None, law=Limited())
+        run_shape(tmp_path / "design.toml", [10.0, 20.0], tmp_path, law=Limited())
     assert (tmp_path / "shape" / "body_10kPa.vtp").exists()
 
 
@@ -170,7 +171,7 @@ def test_shape_refuses_bad_pressures(tmp_path):
     from pneunet.design.shape import run_shape
 
     make_run(tmp_path, (PLANE,), solve=False)
-    for pressures in ([], [-0.01], [float("nan")], [50.0]):
-        with pytest.raises(InputError, match="--pressure-kPa"):
+    for pressures in ([], [-10.0], [float("nan")], [50_000.0]):
+        with pytest.raises(InputError, match="pressure.kPa"):
             run_shape(tmp_path / "design.toml", pressures, tmp_path)
     assert not (tmp_path / "shape").exists()

@@ -11,13 +11,13 @@ from pneunet.base.se3 import transform
 from pneunet.design.report.comparison import Comparison, overlaps, smooth, stopped_short, verdict
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.target.metrics import compare
-from pneunet.reduced.model import AnalyticModel
+from pneunet.reduced import AnalyticLaw
 from tests.design.fake_run import FACTOR, HELIX, PLANE, POSE, make_run
 
 
 def judged(directory):
     run = read_design_folder(directory)
-    return run, Comparison.of(run, AnalyticModel())
+    return run, Comparison.of(run, AnalyticLaw())
 
 
 def test_comparison_is_made_in_target_coordinates(tmp_path):
@@ -102,7 +102,7 @@ def test_report_page_is_whole_and_self_contained(tmp_path):
     from pneunet.design.report.report import write_report
 
     make_run(tmp_path, overlap=0.13)
-    page = write_report(tmp_path, say=lambda text: None).read_text()
+    page = write_report(tmp_path).read_text()
     names = {p.name for p in (tmp_path / "report").iterdir()}
     assert names == {
         "curves.png",
@@ -129,7 +129,7 @@ def test_report_of_a_design_alone_says_what_is_missing(tmp_path):
     from pneunet.design.report.report import write_report
 
     make_run(tmp_path, solve=False)
-    page = write_report(tmp_path, say=lambda text: None).read_text()
+    page = write_report(tmp_path).read_text()
     assert "There is no finite element solution in this folder yet" in page
     with pytest.raises(InputError, match="design.toml"):
         write_report(tmp_path / "report")

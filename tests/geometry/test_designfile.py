@@ -7,11 +7,11 @@ from pneunet.base import se3
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import Gent, NeoHookean
 from pneunet.geometry import Manipulator, Segment
-from pneunet.geometry.designfile import Design, read_design, write_design
+from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
 from pneunet.geometry.loading import Control, DeadLoads, Extras
 
 MATERIAL = NeoHookean(mu=0.25, name='soft "A"', source="a \\ b")
-DESIGN = Design(
+DESIGN = DesignFile(
     Manipulator(
         (
             Segment("twisting", 61.23456789, 3, cavity_floor=0.5, gap=2.0, material=MATERIAL),
@@ -54,14 +54,14 @@ chambers = 3
 
 def test_a_design_reads_back_as_it_was(tmp_path):
     path = tmp_path / "a folder" / "design.toml"
-    write_design(path, DESIGN)
-    back = read_design(path)
+    write_design_file(path, DESIGN)
+    back = read_design_file(path)
     assert back.manipulator == DESIGN.manipulator
     assert back.base_pose == pytest.approx(DESIGN.base_pose, abs=1e-15)
     for name in ("pressure", "name", "mesh_size", "target", "result", "loads", "control", "measure"):
         assert getattr(back, name) == getattr(DESIGN, name), name
     first = path.read_text()
-    write_design(path, back)
+    write_design_file(path, back)
     assert path.read_text() == first
 
 
@@ -75,7 +75,7 @@ def test_loads_turn_with_the_base():
 def test_a_short_file_has_the_defaults(tmp_path):
     path = tmp_path / "short.toml"
     path.write_text(MINIMAL)
-    design = read_design(path)
+    design = read_design_file(path)
     assert design.manipulator.segments == (Segment("one-sided", 60.0, 3, material=NeoHookean(mu=0.3)),)
     assert (design.pressure, design.mesh_size) == (0.02, 2.0)
     assert (design.base_pose == np.eye(4)).all()
@@ -89,7 +89,7 @@ def test_a_layer_takes_its_own_material_or_the_common_one(tmp_path):
     path.write_text(
         f"{MINIMAL.rstrip()}{layer}{segment}{layer}{own}{segment}\n[layer_material]\nmu_MPa = 50\n"
     )
-    segments = read_design(path).manipulator.segments
+    segments = read_design_file(path).manipulator.segments
     assert [s.layer_material and s.layer_material.mu for s in segments] == [50.0, 70.0, None]
     assert [s.layer_thickness for s in segments] == [0.5, 0.5, 0.0]
 
@@ -167,5 +167,5 @@ def test_what_is_wrong_is_named(tmp_path, old, new, message):
     assert old in MINIMAL
     path.write_text(MINIMAL.replace(old, new))
     with pytest.raises(InputError, match=message) as error:
-        read_design(path)
+        read_design_file(path)
     assert str(error.value).startswith(str(path)) and "\n" not in str(error.value)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pneunet.geometry.designfile import read_design
+from pneunet.geometry.designfile import read_design_file
 from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.verification import reference_case
 
@@ -10,7 +10,7 @@ from pneunet.hifi.verification import reference_case
 @pytest.fixture
 def reference():
     """A ManipulatorSolve of hifi/verification/data/reference.msh."""
-    design = read_design(reference_case.DATA / "reference.toml")
+    design = read_design_file(reference_case.DATA / "reference.toml")
     solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
     yield solve
     solve.destroy()

@@ -6,7 +6,7 @@ from scipy.interpolate import CubicSpline
 
 from pneunet.base.errors import ConvergenceError
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.hifi.body.problem import MixedProblem, Support
+from pneunet.hifi.body.problem import BodyProblem, Support
 from pneunet.hifi.body.system import BodySystem
 from pneunet.hifi.fem.loads import EndLoad, Pressure
 from pneunet.hifi.fem.surface import FaceQuadrature
@@ -61,7 +61,7 @@ def test_several_pressures_rise_together(shared_directory):
     """One path, two pressures at a ratio: only their difference deforms an incompressible sphere."""
     mesh = bodies.round_body(shared_directory, "sphere", 0.25)
     inner, outer = Pressure((bodies.INNER,)), Pressure((bodies.OUTER,))
-    problem = MixedProblem(*mesh, NeoHookean(1.0), SYMMETRY, [inner, outer])
+    problem = BodyProblem(*mesh, NeoHookean(1.0), SYMMETRY, [inner, outer])
 
     def apply(load):
         inner.value.value, outer.value.value = 1.5 * load, 0.5 * load

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from pneunet.base import se3
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import Manipulator, Segment
-from pneunet.geometry.designfile import Design
+from pneunet.geometry.designfile import DesignFile
 from pneunet.hifi.contact.body_distance import winding_numbers
 from pneunet.hifi.contact.touch import Load, Touch, TouchWatch, first_zero
 from pneunet.hifi.runs.solve.solve import solve_design
@@ -121,21 +121,23 @@ def rows(path):
         return list(csv.DictReader(stream))
 
 
-def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory):
+def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory, caplog):
     """Tall chambers a millimetre apart: touching at about 7.5 kPa; the run goes on later and does not
     forget."""
-    said, design = [], Design(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0, contact="none")
-    last = solve_design(design, shared_directory, fields=False, say=said.append)
+    caplog.set_level("INFO", "pneunet")
+    design = DesignFile(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0, contact="none")
+    last = solve_design(design, shared_directory, fields=False)
     assert (
         last.touch.walls_overlap
         and not last.touch.body_overlap
         and 6 < last.touch.walls_from.pressure * 1e3 < 9
     )
-    again = solve_design(design, shared_directory, pressure=0.010, fields=False, say=said.append, resume=True)
+    again = solve_design(design, shared_directory, pressure=0.010, fields=False, resume=True)
     assert again.touch.walls_from.pressure == pytest.approx(last.touch.walls_from.pressure, rel=1e-9)
     if MPI.COMM_WORLD.rank == 0:
-        assert sum("touch at" in text for text in said) == 1
-        assert "WALLS OVERLAP from" in said[-1] and said[-1].startswith("done: 10 kPa")
+        assert sum("touch at" in text for text in caplog.messages) == 1
+        last_line = caplog.messages[-1]
+        assert "WALLS OVERLAP from" in last_line and last_line.startswith("done: 10 kPa")
         out = shared_directory / "solve"
         record, steps = json.loads((out / "run.json").read_text()), rows(out / "steps.csv")
         first = record["first_touch_kPa"]
@@ -155,10 +157,11 @@ def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory):
         ]
 
 
-def test_contact_holds_walls_apart_on_any_number_of_ranks_and_after_a_resumption(shared_directory):
-    said, design = [], Design(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0)
-    last = solve_design(design, shared_directory, fields=False, say=said.append)
-    again = solve_design(design, shared_directory, pressure=0.012, fields=False, say=said.append, resume=True)
+def test_contact_holds_walls_apart_on_any_number_of_ranks_and_after_a_resumption(shared_directory, caplog):
+    caplog.set_level("INFO", "pneunet")
+    design = DesignFile(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0)
+    last = solve_design(design, shared_directory, fields=False)
+    again = solve_design(design, shared_directory, pressure=0.012, fields=False, resume=True)
     for m in (last, again):
         assert m.touch.contact and not m.touch.walls_overlap and 6 < m.touch.walls_from.pressure * 1e3 < 9
         assert abs(m.touch.wall_distance) < 0.03 * TALL.gap
@@ -169,6 +172,7 @@ def test_contact_holds_walls_apart_on_any_number_of_ranks_and_after_a_resumption
         assert float(rows(out / "steps.csv")[-1]["contact_force_N"]) == pytest.approx(
             again.touch.contact_force, rel=1e-9
         )
-        assert not json.loads((out / "run.json").read_text())[
-            "walls_overlap"
-        ] and "held apart by contact" in "".join(said)
+        assert (
+            not json.loads((out / "run.json").read_text())["walls_overlap"]
+            and "held apart by contact" in caplog.text
+        )

@@ -1,6 +1,7 @@
 """The engine of studies and campaigns, with cases that really crash, hang and eat memory, on one, two and
 three ranks."""
 
+import importlib
 import json
 import os
 import signal
@@ -11,7 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from pneunet.hifi.runs.campaign.file import read_campaign
+from pneunet.hifi.runs.case_process import FUNCTIONS
 from pneunet.hifi.runs.jit_cache import own_cache
+from pneunet.hifi.runs.study.file import read_study
 from tests.toy_cases import ENDINGS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -121,3 +125,14 @@ def test_a_cache_serves_one_at_a_time_and_forgets_half_a_module(tmp_path, monkey
             "libffcx_forms_whole.c",
             "libffcx_forms_whole.c.cached",
         ]
+
+
+def test_folders_of_finished_cases_keep_their_names():
+    """Wherever their functions move: weeks of computing are found again."""
+    campaign = read_campaign(ROOT / "examples" / "campaigns" / "cells-v1.toml")
+    assert campaign.designs[0].case.name == "2cd907a6e41e"
+    study = read_study(ROOT / "examples" / "studies" / "angles.toml")
+    assert study.cases[0].case.name == "6b6b771ce679"
+    for place in FUNCTIONS.values():
+        module, name = place.split(":")
+        assert callable(getattr(importlib.import_module(module), name))

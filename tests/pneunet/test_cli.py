@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pneunet.base.files.schemas import CENTRELINE, CENTRELINES, POINT, SEGMENTS, SHAPES, STEPS
 from pneunet.geometry.cad.mesh import segment_tables
-from pneunet.geometry.designfile import read_design
+from pneunet.geometry.designfile import read_design_file
 
 PNEUNET = Path(sys.executable).with_name("pneunet")
 #: 25 mm of an arc of curvature 20 1/m that bends away from the chambers' side
@@ -32,40 +33,6 @@ kind = "bending"
 length_mm = 25.0
 """
 COMMANDS = ("design", "shape", "mesh", "solve", "report", "fit-material", "run", "doctor")
-STEPS = [
-    "step",
-    "pressure_kPa",
-    "iterations",
-    "factorisations",
-    "volume_mm3",
-    "tip_x_mm",
-    "tip_y_mm",
-    "tip_z_mm",
-    "smallest_wall_distance_mm",
-    "walls_overlap",
-    "body_distance_mm",
-    "body_overlap",
-    "contact_force_N",
-    "largest_stretch",
-    "unstable_directions",
-    "dead_load_fraction",
-    "stability_factorisations",
-    "seconds",
-]
-MARKS = ["walls_overlap", "body_overlap"]
-CENTRELINES = ["step", "pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm", *MARKS]
-SEGMENTS = [
-    "step",
-    "pressure_kPa",
-    "segment",
-    "e1",
-    "e2",
-    "e3",
-    "k1_rad_per_mm",
-    "k2_per_mm",
-    "k3_per_mm",
-    *MARKS,
-]
 
 
 def pneunet(*arguments, cwd):
@@ -79,7 +46,7 @@ def pneunet(*arguments, cwd):
 def table(path, header):
     with open(path, newline="") as stream:
         first, *rows = csv.reader(stream)
-    assert first == header
+    assert first == list(header)
     return np.array(rows, float)
 
 
@@ -113,10 +80,10 @@ def test_design_writes_what_it_found(folder):
     run = folder / "run 1"
     names = {"design.toml", "target.csv", "centreline.csv", "design.png", "run.json"}
     assert names <= {p.name for p in run.iterdir()}
-    design = read_design(run / "design.toml")
+    design = read_design_file(run / "design.toml")
     assert design.pressure == pytest.approx(0.040) and len(design.manipulator.segments) == 1
-    assert table(run / "target.csv", ["x_mm", "y_mm", "z_mm"]) == pytest.approx(ARC)
-    line = table(run / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"])
+    assert table(run / "target.csv", POINT) == pytest.approx(ARC)
+    line = table(run / "centreline.csv", CENTRELINE)
     # in the target's coordinates, from its first point on, as long as the body at rest
     assert line[0] == pytest.approx([0.0, 3.0, 2.0, 1.0], abs=1e-9)
     assert line[-1, 0] == pytest.approx(design.manipulator.length)
@@ -130,7 +97,7 @@ def test_design_writes_what_it_found(folder):
 def test_design_of_a_bare_csv_says_that_its_split_is_simple(folder, tmp_path):
     told = pneunet("design", folder / "my arc.csv", cwd=tmp_path)
     assert "simple automatic split" in told
-    design = read_design(tmp_path / "out" / "my arc" / "design.toml")  # where it goes without -o
+    design = read_design_file(tmp_path / "out" / "my arc" / "design.toml")  # where it goes without -o
     assert "simple automatic split" in design.result["split"]
 
 
@@ -149,9 +116,9 @@ def test_shape_agrees_with_the_design(folder):
 
     pneunet("shape", "run 1/design.toml", "--pressure-kPa", "40,20", "-o", "shapes of it", cwd=folder)
     out = folder / "shapes of it" / "shape"
-    lines = table(out / "centrelines.csv", ["pressure_kPa", "s_mm", "x_mm", "y_mm", "z_mm"])
+    lines = table(out / "centrelines.csv", SHAPES)
     assert sorted(set(lines[:, 0])) == [20.0, 40.0]
-    designed = table(folder / "run 1" / "centreline.csv", ["s_mm", "x_mm", "y_mm", "z_mm"])
+    designed = table(folder / "run 1" / "centreline.csv", CENTRELINE)
     assert lines[lines[:, 0] == 40.0][:, 1:] == pytest.approx(designed, abs=1e-6)
     names = {"centrelines.csv", "body_20kPa.vtp", "body_40kPa.vtp", "bodies.png", "inflation.gif", "run.json"}
     assert {p.name for p in out.iterdir()} == names
@@ -164,7 +131,7 @@ def test_shape_agrees_with_the_design(folder):
 def test_mesh_stands_beside_the_design(folder):
     out = folder / "run 1" / "mesh"  # made by solve, as `pneunet mesh` makes it
     facts = json.loads((out / "mesh.json").read_text())
-    design = read_design(folder / "run 1" / "design.toml")
+    design = read_design_file(folder / "run 1" / "design.toml")
     assert facts["segments"] == segment_tables(design.manipulator) and facts["mesh_size_mm"] == 4.0
     told = pneunet("mesh", "run 1/design.toml", "--mesh-size-mm", "4", "-o", "a mesh", cwd=folder)
     again = json.loads((folder / "a mesh" / "mesh" / "mesh.json").read_text())
@@ -175,7 +142,7 @@ def test_mesh_stands_beside_the_design(folder):
 
 def test_tables_of_a_solve_agree_with_each_other(folder):
     out = folder / "run 1" / "solve"
-    manipulator = read_design(folder / "run 1" / "design.toml").manipulator
+    manipulator = read_design_file(folder / "run 1" / "design.toml").manipulator
     steps, lines = table(out / "steps.csv", STEPS), table(out / "centrelines.csv", CENTRELINES)
     assert steps[:, 0] == pytest.approx(np.arange(len(steps)))
     assert steps[0, 1] == 0.0 and steps[-1, 1] == pytest.approx(10.0) and (np.diff(steps[:, 1]) > 0).all()

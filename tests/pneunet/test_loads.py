@@ -112,14 +112,14 @@ def test_arc_length_walks_the_same_curve_and_pressure_stops_below_it(ballooned, 
 def test_a_resumed_volume_walk_ends_at_the_same_state_and_knows_its_limit_point(ballooned, tmp_path):
     folder, steps, record = ballooned
     code = """import os, sys
-from hifi import checkpoint
 from pneunet.cli import main
-save = checkpoint.save
-def last(directory, path, step, *rest):
-    save(directory, path, step, *rest)
-    if path.limit_points:
+from pneunet.hifi.runs.solve.checkpoint import Checkpoint
+save = Checkpoint.accepted
+def last(self, measured):
+    save(self, measured)
+    if measured.limit_points:
         os.kill(os.getpid(), 9)
-checkpoint.save = last
+Checkpoint.accepted = last
 main(sys.argv[1:])"""
     (tmp_path / "design.toml").write_text((folder / "design.toml").read_text())
     command = ["solve", str(tmp_path / "design.toml"), "--no-fields"]

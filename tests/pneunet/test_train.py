@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from pneunet.base.files.dataset import write_dataset
-from tests.reduced.test_law import made_up_data
+from tests.reduced.made_up_cells import made_up_data
 
 ROOT = Path(__file__).resolve().parents[2]
 

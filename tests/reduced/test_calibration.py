@@ -39,7 +39,7 @@ def test_softness_and_slant():
         for angle in (45.0, 90.0)
     ]
     softer = [replace(body, material=NeoHookean(0.2 / (1.4 * body.sin**-0.5))) for body in bodies]
-    curvature = np.array([np.linalg.norm(HelicalCell(body).strains(PRESSURES)[1], axis=1) for body in softer])
+    curvature = np.array([np.linalg.norm(HelicalCell(body).strains(PRESSURES).k, axis=1) for body in softer])
     assert calibrate_softness(bodies, PRESSURES, curvature) == pytest.approx((1.4, 0.5), rel=1e-3)
     assert calibrate_softness(bodies[1:], PRESSURES, curvature[1:], slanted=False) == pytest.approx(
         (1.4, 0.0), rel=1e-3

@@ -5,7 +5,8 @@ import pytest
 
 from pneunet.reduced.trained import gaussian
 from pneunet.reduced.trained.along_inputs import AlongInputs
-from pneunet.reduced.trained.gaussian import JITTER, NEAR, TREND, Slopes, _misfit, _spread_over, fit
+from pneunet.reduced.trained.gaussian import JITTER, TREND
+from pneunet.reduced.training.regression import NEAR, FitSettings, Slopes, _misfit, _spread_over, fit
 
 
 def observed(n, seed=0):
@@ -78,7 +79,7 @@ def test_slopes_are_followed_and_spare_observations():
         [2 * np.cos(2 * x[:, 0]) * ways[:, 0] + ways[:, 1], x[:, 1] * ways[:, 0] + x[:, 0] * ways[:, 1]]
     )
     process, without = fit(x, y, group, slopes=Slopes(at, ways, steep)), fit(x, y, group)
-    _, found = process(x, derivative=True)
+    _, found = process.with_slopes(x)
     assert np.einsum("npd,nd->np", found, ways) == pytest.approx(steep, abs=0.02)
     new = observed(30, seed=1)[0]
     truth = np.column_stack([np.sin(2 * new[:, 0]) + new[:, 1], new[:, 0] * new[:, 1]])
@@ -118,10 +119,14 @@ def test_the_deviation_is_what_observations_and_slopes_leave_of_the_weights(monk
 
 def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():
     x, y, group = observed(300)
-    process, new, h = fit(x, y, group, most=100, inducing=60), observed(30, seed=1)[0], 1e-6
+    process, new, h = (
+        fit(x, y, group, settings=FitSettings(most=100, inducing=60)),
+        observed(30, seed=1)[0],
+        1e-6,
+    )
     truth = np.column_stack([np.sin(2 * new[:, 0]) + new[:, 1], new[:, 0] * new[:, 1]])
     assert process(new) == pytest.approx(truth, abs=0.02)
-    value, slopes = process(new, derivative=True)
+    value, slopes = process.with_slopes(new)
     assert (value == process(new)).all()
     for i in range(2):
         step = h * np.eye(2)[i]
@@ -135,7 +140,7 @@ def test_along_some_inputs_it_is_the_same_process_with_second_derivatives():
     process, new, h = fit(x, y, group), observed(30, seed=1)[0], 1e-5
     along = AlongInputs(process, [1, 0])
     value, slopes, second = along.at(new)
-    known, gradient = process(new, derivative=True)
+    known, gradient = process.with_slopes(new)
     assert value == pytest.approx(known[:, 0], abs=1e-9) and slopes == pytest.approx(
         gradient[:, 0, ::-1], abs=1e-8
     )

@@ -7,12 +7,13 @@ from scipy.integrate import solve_bvp
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.strains import MIRROR
 from pneunet.geometry import Manipulator
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.reference_cases import CASES
 from pneunet.reduced.rod.equilibrium import Grid
-from pneunet.reduced.rod.laws import QuadraticLaw, passive_law
-from pneunet.reduced.rod.rod import Piece, Rod
+from pneunet.reduced.rod.quadratic import QuadraticLaw, passive_law
+from pneunet.reduced.rod.rod import Rod, RodPiece
 
 REST = np.eye(6)[0]
 #: EA, GA, GA in N, GJ, EI, EI in N mm2
@@ -29,7 +30,7 @@ def law(strains=REST, stiffness=SLENDER):
 
 
 def uniform(length=60.0, strains=REST, stiffness=SLENDER, **keys):
-    return Rod([Piece(length, law(strains, stiffness), **keys)])
+    return Rod([RodPiece(length, law(strains, stiffness), **keys)])
 
 
 class Stiffening:
@@ -63,9 +64,9 @@ class Stiffening:
 
 MIXED = Rod(
     [
-        Piece(20.0, law(HELICAL, COUPLED), mass=7e-8, mass_centre=(0.0, 1.0)),
-        Piece(5.0, law(REST, 3 * SLENDER), mass=5e-8, mass_centre=(0.0, -0.5)),
-        Piece(25.0, law(HELICAL * [1, -1, 1, -1, 1, 1], COUPLED), mass=7e-8, mass_centre=(0.3, 1.0)),
+        RodPiece(20.0, law(HELICAL, COUPLED), mass=7e-8, mass_centre=(0.0, 1.0)),
+        RodPiece(5.0, law(REST, 3 * SLENDER), mass=5e-8, mass_centre=(0.0, -0.5)),
+        RodPiece(25.0, law(HELICAL * MIRROR, COUPLED), mass=7e-8, mass_centre=(0.3, 1.0)),
     ],
     tip_centre=(0.2, -0.5),
 )
@@ -78,7 +79,7 @@ def vectors(gravity=(0, 0, 0), force=(0, 0, 0), moment=(0, 0, 0), distributed=(0
 
 @pytest.mark.parametrize("moment", [(0.0, 0.0, 0.0), MOMENT], ids=["conservative", "tip moment"])
 def test_gradient_hessian_and_newton_step_are_exact(moment):
-    rod = Rod([*MIXED.pieces[:2], Piece(25.0, Stiffening(0.1))], tip_centre=MIXED.tip_centre)
+    rod = Rod([*MIXED.pieces[:2], RodPiece(25.0, Stiffening(0.1))], tip_centre=MIXED.tip_centre)
     grid = Grid(rod, np.array([2, 1, 2]), vectors(GRAVITY, FORCE, moment, (1e-3, 0.0, 2e-3)))
     elements, loads, step = grid.elements, grid.loads, 1e-6
     x = elements.free()
@@ -216,7 +217,7 @@ def test_large_loads_are_reached_in_load_steps():
 
 def test_a_law_that_stiffens_bends_less_and_slow_loading_ends_there_too():
     force = DeadLoads(tip_force=(0.0, 0.05, -0.05))
-    hard, soft = (Rod([Piece(40.0, own)]) for own in (Stiffening(0.05), law(HELICAL, COUPLED)))
+    hard, soft = (Rod([RodPiece(40.0, own)]) for own in (Stiffening(0.05), law(HELICAL, COUPLED)))
     at_once, slowly = hard.equilibrium(force), hard.equilibrium(force, first_load=0.1)
     moved = [
         np.linalg.norm(state.tip[:3, 3] - rod.free().points[-1])
@@ -326,13 +327,13 @@ class TestOfAManipulator:
 
 BAD = {
     "no pieces": (lambda: Rod([]), "pieces"),
-    "length": (lambda: Piece(0.0, law()), "length_mm = 0"),
-    "pressure": (lambda: Piece(1.0, law(), -1e-3), "pressure_kPa = -1"),
-    "mass": (lambda: Piece(1.0, law(), mass=np.nan), "mass = nan"),
-    "pose": (lambda: Rod([Piece(1.0, law())], 2 * np.eye(4)), "base_pose"),
+    "length": (lambda: RodPiece(0.0, law()), "length_mm = 0"),
+    "pressure": (lambda: RodPiece(1.0, law(), -1e-3), "pressure_kPa = -1"),
+    "mass": (lambda: RodPiece(1.0, law(), mass=np.nan), "mass = nan"),
+    "pose": (lambda: Rod([RodPiece(1.0, law())], 2 * np.eye(4)), "base_pose"),
     "no law": (
-        lambda: Piece(1.0, 3.0),
-        "law: float is no rod law, which has free_strains, psi, force, stiffness",
+        lambda: RodPiece(1.0, 3.0),
+        "law: float is no SectionLaw, which has free_strains, psi, force and stiffness",
     ),
     "tolerance": (lambda: MIXED.equilibrium(tolerance=0.0), "tolerance = 0 must lie in"),
     "first load": (lambda: MIXED.equilibrium(first_load=2.0), "first_load = 2 must lie in"),
@@ -341,6 +342,7 @@ BAD = {
         lambda: Rod.of(TestOfAManipulator.body, [law()] * 3, 0.0),
         "one for all or one for each of the 2 segments",
     ),
+    "no laws": (lambda: Rod.of(TestOfAManipulator.body, 3.0, 0.0), "laws: float is no SegmentLaw"),
     "pressures": (
         lambda: Rod.of(TestOfAManipulator.body, law(), (0.0, 0.0, 0.0)),
         "one for all or one for each of the 2 segments",

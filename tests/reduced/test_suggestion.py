@@ -8,7 +8,7 @@ from pneunet.geometry.parameters import TWISTING
 from pneunet.geometry.shape_numbers import shape_numbers
 from pneunet.hifi.runs.campaign.sample import RANGES, segments
 from pneunet.reduced import shipped_law
-from pneunet.reduced.trained import gaussian
+from pneunet.reduced.training.regression import fit
 from pneunet.reduced.training.suggestion import greedy, most_telling
 
 
@@ -16,13 +16,13 @@ def test_the_first_of_them_is_the_one_that_lowers_the_weighed_variance_most():
     rng = np.random.default_rng(0)
     x, offered = rng.uniform(-1, 0.5, (15, 2)), rng.uniform(-1, 1, (20, 2))
     y = np.sin(2 * x[:, :1]) + x[:, 1:] ** 2
-    process = gaussian.fit(x, y, np.arange(15))
+    process = fit(x, y, np.arange(15))
     blocks = [np.arange(i, i + 2) for i in range(0, 20, 2)]
     before = process.deviation(offered)[:, 0] ** 2
     left = []
     for block in blocks:
         rows, group = np.vstack([x, offered[block]]), np.append(np.arange(15), [99, 99])
-        after = gaussian.fit(rows, np.append(y, [[1.0], [2.0]], axis=0), group, like=process)
+        after = fit(rows, np.append(y, [[1.0], [2.0]], axis=0), group, like=process)
         left.append((before * np.diag(after.covariance(offered))).sum())
     chosen = greedy(process, offered, blocks, 4)
     assert chosen[0] == np.argmin(left) and len(set(chosen)) == 4

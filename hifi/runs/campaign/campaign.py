@@ -2,9 +2,11 @@
 of the rod law."""
 
 import json
+import logging
 import time
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -18,9 +20,11 @@ from pneunet.geometry.shape_numbers import SHAPE, direction_matrix, normal_pitch
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.runs.campaign.case import STATES
 from pneunet.hifi.runs.campaign.extension import Known, taken_over
-from pneunet.hifi.runs.campaign.file import read_campaign
+from pneunet.hifi.runs.campaign.file import Campaign, read_campaign
 from pneunet.hifi.runs.campaign.sample import MU
-from pneunet.hifi.runs.cases import STATUSES, run_cases
+from pneunet.hifi.runs.cases import STATUSES, Case, run_cases
+
+log = logging.getLogger(__name__)
 
 DATA, SHEET = "cells.npz", "cells.md"
 #: s between two writings of the data set while it grows
@@ -30,48 +34,51 @@ PAUSE = 60.0
 LARGEST_SYMMETRY_DEFECT = 0.02
 
 
-def run_campaign(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False, extend=None):
+def run_campaign(
+    path: str | Path,
+    directory: str | Path,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    retry: bool = False,
+    extend: str | Path | None = None,
+) -> CellData:
     """Compute the cases of CAMPAIGN.toml that are not finished in `directory`; collective. Returns the
     CellData.
 
     extend: a data set whose cases are taken over as they are. directory gets cells.npz and its data sheet
     cells.md, rewritten while it grows, run.json and cases/NAME.
     """
-    say, directory, started = (
-        say if comm.rank == 0 else (lambda text: None),
-        Path(directory),
-        time.perf_counter(),
-    )
+    directory, started = Path(directory), time.perf_counter()
     campaign = on_rank_0(comm, lambda: read_campaign(path))
     known = on_rank_0(comm, lambda: taken_over(campaign, extend)) if extend else Known()
     on_rank_0(comm, lambda: output_directory(directory) and None)
     counts = Counter((d.kind, d.mesh.name) for d in campaign.designs)
     for (kind, mesh), number in counts.items():
-        say(f"campaign: {number} {kind} designs on mesh '{mesh}'")
+        log.info(f"campaign: {number} {kind} designs on mesh '{mesh}'")
     gathering = Gathering(campaign, directory, known)
     if extend:
-        say(f"{len(known.cases)} of them are taken over from {extend}")
+        log.info(f"{len(known.cases)} of them are taken over from {extend}")
     cases = [d.case for d in campaign.designs if d.case.name not in known.cases]
-    run_cases(cases, directory / "cases", campaign.limits, comm, say, gathering.add, retry)
-    return on_rank_0(comm, lambda: gathering.finish(comm.size, time.perf_counter() - started, say))
+    run_cases(cases, directory / "cases", campaign.limits, comm, gathering.add, retry)
+    return on_rank_0(comm, lambda: gathering.finish(comm.size, time.perf_counter() - started))
 
 
 class Gathering:
     """The records that are known, and what is taken over (`known`), turned into the data set."""
 
-    def __init__(self, campaign, directory, known):
+    def __init__(self, campaign: Campaign, directory: str | Path, known: Known) -> None:
         self.campaign, self.directory, self.known = campaign, Path(directory), known
         self.records, self.written = {}, time.monotonic()
         self._states = {}
 
-    def add(self, case, record):
+    def add(self, case: Case, record: dict[str, Any]) -> None:
+        """Take the record of a case with the states in its folder."""
         self.records[case.name] = record
         path = self.directory / "cases" / case.name / STATES
         self._states[case.name] = json.loads(path.read_text()) if path.exists() else []
         if time.monotonic() - self.written > PAUSE:
             self.write()
 
-    def write(self):
+    def write(self) -> CellData:
         """Write data set and data sheet of what is known; returns the CellData. InputError when that cannot
         be written."""
         data = self.data()
@@ -85,20 +92,21 @@ class Gathering:
         self.written = time.monotonic()
         return data
 
-    def finish(self, ranks, seconds, say):
+    def finish(self, ranks: int, seconds: float) -> CellData:
+        """Write what is known with run.json."""
         data = self.write()
         counts = Counter(record["status"] for record in self.records.values())
         write_record(
             self.directory, campaign=self.campaign.table, cases=counts, ranks=ranks, wall_seconds=seconds
         )
-        say(", ".join(f"{number} {status}" for status, number in counts.items()))
-        say(
+        log.info(", ".join(f"{number} {status}" for status, number in counts.items()))
+        log.info(
             f"{len(data.kind)} cases, {data.accepted.mean():.1%} accepted, {len(data.case)} states in"
             f" {self.directory / DATA}; {SHEET}"
         )
         return data
 
-    def data(self):
+    def data(self) -> CellData:
         """The CellData of what is known so far, in order of the sample."""
         c = self.campaign
         known = [d for d in c.designs if d.case.name in self.records or d.case.name in self.known.cases]

@@ -20,7 +20,6 @@ from pneunet.geometry.cad.cell import mesh_cell
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.shape_slopes import ShapeSlopes
-from pneunet.hifi.cell.stored_energy import StoredEnergy
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.contact.touch import Load, TouchWatch
@@ -85,7 +84,6 @@ class Sampler:
         self.problem, self.directory = problem, directory
         self.mu = problem.segment.material.mu
         self.system = CellSystem(problem)
-        self.energy = StoredEnergy(problem)
         self.slopes = ShapeSlopes(problem) if slopes else None
         self.options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
         self.walked = []  # PathStates of the scout, their parameter the pressure
@@ -170,11 +168,11 @@ class Sampler:
         row = {
             "kind": kind,
             "pressure": state.pressure,
-            "strains": [*state.strains.e, *state.strains.k],
+            "strains": [*state.strains.vector],
             "forces": [*state.force, *state.moment],
             "stiffness": state.stiffness.tolist(),
             "volume": state.volume,
-            "energy": self.energy.value(),
+            "energy": self.problem.stored_energy(),
             "unstable": state.unstable,
             "largest_stretch": state.largest_stretch,
             "residual": residual / scale,

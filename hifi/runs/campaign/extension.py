@@ -3,11 +3,13 @@ folders that they came from."""
 
 import json
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.dataset import columns, read_dataset
+from pneunet.hifi.runs.campaign.file import Campaign
 from pneunet.hifi.runs.cases import STATUSES
 
 
@@ -20,7 +22,7 @@ class Known:
     revisions: frozenset = frozenset()
 
 
-def taken_over(campaign, path):
+def taken_over(campaign: Campaign, path: str | Path) -> Known:
     """What the data set at `path` knows of a Campaign's cases, found by kind, index and mesh. InputError when
     its sample is another."""
     data = read_dataset(path)

@@ -2,12 +2,14 @@
 
 import json
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import as_table, number, read_toml, refuse_unknown, to_table
 from pneunet.base.materials.laws import material_to_table
 from pneunet.base.system.processes import Limits
-from pneunet.geometry.parameters import KINDS
+from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.runs.campaign.sample import PLACES, RANGES, prescribed_states, segments
 from pneunet.hifi.runs.cases import Case
 
@@ -39,26 +41,26 @@ class Mesh:
     """
 
     name: str
-    settings: dict
+    settings: dict[str, float]
     every: int = 1
     prescribed: int = 0
     prescribed_every: int = 1
     slopes: bool = False
 
-    def prescribed_of(self, index):
+    def prescribed_of(self, index: int) -> int:
         """How many prescribed states the design has."""
         return self.prescribed if index // self.every % self.prescribed_every == 0 else 0
 
 
 @dataclass(frozen=True)
-class Design:
+class SampledDesign:
     """One case: what is computed, and what the data set says about where it stands in the sample."""
 
     kind: str
     index: int
     mesh: Mesh
     held_out: bool
-    segment: object
+    segment: Segment
     case: Case
 
 
@@ -67,15 +69,15 @@ class Campaign:
     """designs in the order of computing: by index, so that a campaign that is ended half way is a smaller
     one."""
 
-    designs: tuple
-    kinds: tuple
-    meshes: tuple
-    ranges: dict
+    designs: tuple[SampledDesign, ...]
+    kinds: tuple[str, ...]
+    meshes: tuple[Mesh, ...]
+    ranges: dict[str, dict[str, tuple[float, float]]]
     limits: Limits
-    table: dict
+    table: dict[str, Any]
 
 
-def read_campaign(path):
+def read_campaign(path: str | Path) -> Campaign:
     """The Campaign in a TOML file; InputError that names key and fix otherwise."""
     data, where = read_toml(path), str(path)
     refuse_unknown(data, KEYS, where)
@@ -134,7 +136,7 @@ def read_campaign(path):
                             states[position][: mesh.prescribed_of(index)],
                             settings,
                         )
-                        designs.append(Design(kind, index, mesh, judge, bodies[position], case))
+                        designs.append(SampledDesign(kind, index, mesh, judge, bodies[position], case))
     designs.sort(key=lambda d: d.index)
     table = {
         "designs": count,
@@ -157,7 +159,7 @@ def read_campaign(path):
     )
 
 
-def on_offer(campaign, kind, count):
+def on_offer(campaign: Campaign, kind: str, count: int) -> list[tuple[int, Segment]]:
     """[(index, Segment)] of the next `count` designs of the sample after a Campaign's that could be further
     ones: neither held out nor among its own."""
     start, known = campaign.table["designs"], {d.index for d in campaign.designs if d.kind == kind}
@@ -170,7 +172,7 @@ def on_offer(campaign, kind, count):
     return [(i, bodies[i]) for i in free]
 
 
-def is_held_out(index, every):
+def is_held_out(index: int, every: int) -> bool:
     """Every n-th design, never the first: chosen by index alone, before anything is computed."""
     return index % every == every - 1
 

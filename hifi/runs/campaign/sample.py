@@ -56,10 +56,12 @@ class Prescribed:
 
     level: float
     amplitude: float
-    direction: tuple | None = None
+    direction: tuple[float, ...] | None = None
 
 
-def segments(kind, ranges, count, seed, at_edges=False):
+def segments(
+    kind: str, ranges: dict[str, tuple[float, float]], count: int, seed: int, at_edges: bool = False
+) -> list[Segment]:
     """The first `count` Segments of a kind; ranges: {variable: (low, high)} with the keys of RANGES[kind].
     at_edges: distributed as Chebyshev's nodes along every variable. (Measured: the 200 of 400 uniform designs
     that lie furthest out, or half of them those and half any, teach a law as much as all 400.)"""
@@ -94,7 +96,7 @@ def _segment(kind, v):
     )
 
 
-def prescribed_states(kind, count, each, seed):
+def prescribed_states(kind: str, count: int, each: int, seed: int) -> list[list[Prescribed]]:
     """[[Prescribed] of each design]: the free strains' own direction first, extrapolated twofold, then `each`
     - 1 others."""
     points = _sobol(8, count * PLACES, seed + 100 + KINDS.index(kind)).reshape(count, PLACES, 8)

@@ -10,6 +10,7 @@ import io
 import json
 from dataclasses import astuple
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -17,29 +18,39 @@ from scipy.spatial import cKDTree
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
+from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.fem.agreement import on_rank_0
-from pneunet.hifi.path.equilibrium import LimitPoint, PathState
+from pneunet.hifi.path.equilibrium import EquilibriumPath, LimitPoint, PathState
 from pneunet.hifi.path.stepping import Step
 
-NAME = "checkpoint.npz"
+CHECKPOINT = "checkpoint.npz"
 #: mm; nodes of another mesh are further apart than this, and one that is moved by the rounding of its file is
 #: not
 NEAR = 1e-6
 
 
-def save(directory, path, step, stage, identity):
-    """Write the EquilibriumPath of a hifi.body.system.BodySystem after `step` of a `stage`; collective.
-    OSError on all ranks.
+class Checkpoint:
+    """Writes where the path of a solve is after every accepted step, once what it refers to is on disk.
 
-    identity: {name: JSON value} of what the run is of; `read` compares it.
+    identity: {name: JSON value} of what the run is of; `read_checkpoint` compares it.
     """
-    problem, newton = path.system.problem, path.newton
+
+    def __init__(self, directory: Path, solve: ManipulatorSolve, identity: dict[str, Any]) -> None:
+        self.directory, self.solve, self.identity = directory, solve, identity
+
+    def accepted(self, m: Measured) -> None:
+        if m.step:
+            _save(self.directory, self.solve, self.identity)
+
+
+def _save(directory, solve, identity):
+    path, problem, newton = solve.path, solve.problem, solve.path.newton
     factorised = [newton.factorised_at] if newton.current else []
     states = [a.state for a in path.accepted] + [state for state, _ in factorised]
     content = {
         "belongs_to": _text(identity),
-        "stage": stage,
-        "step": np.array(astuple(step), float),
+        "stage": solve.stage,
+        "step": np.array(astuple(solve.last_step), float),
         "parameter": np.array([a.parameter for a in path.accepted]),
         "load": np.array([a.load for a in path.accepted] + [load for _, load in factorised]),
         "volume": np.array([a.volume for a in path.accepted]),
@@ -61,16 +72,16 @@ def save(directory, path, step, stage, identity):
         # a zip file on a full disk fails a second time, out of reach, when Python discards it
         archive = io.BytesIO()
         np.savez(archive, **content)
-        with atomic_path(Path(directory) / NAME) as temporary:
+        with atomic_path(directory / CHECKPOINT) as temporary:
             temporary.write_bytes(archive.getbuffer())
 
     on_rank_0(problem.mesh.comm, write)
 
 
-def read(directory, identity):
+def read_checkpoint(directory: Path, identity: dict[str, Any]) -> dict[str, np.ndarray] | None:
     """{name: array} of the checkpoint in `directory`, None without one; InputError when it is of something
     else than `identity`."""
-    path = Path(directory) / NAME
+    path = directory / CHECKPOINT
     try:
         with np.load(path, allow_pickle=False) as stored:
             content = dict(stored)
@@ -88,7 +99,7 @@ def read(directory, identity):
     return content
 
 
-def restore(content, path):
+def restore(content: dict[str, np.ndarray], path: EquilibriumPath) -> Step:
     """Put the EquilibriumPath where the checkpoint was written; its Step. Collective; InputError when the
     mesh is another."""
     problem = path.system.problem
@@ -102,7 +113,8 @@ def restore(content, path):
     furthest = problem.mesh.comm.allreduce(furthest, op=MPI.MAX)
     if furthest > NEAR or not sizes:
         raise InputError(
-            f"{NAME}: belongs to another mesh (a node is {furthest:.1e} mm away): solve without --resume"
+            f"{CHECKPOINT}: belongs to another mesh (a node is {furthest:.1e} mm away): solve without"
+            " --resume"
         )
     loads, parameters = content["load"].tolist(), content["parameter"].tolist()
     accepted = [PathState(*each) for each in zip(parameters, loads, states, content["volume"].tolist())]

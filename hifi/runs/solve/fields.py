@@ -5,9 +5,13 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.files.atomic import write_text
+from pneunet.base.units import KPA_PER_MPA
+from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.fem.surface import EDGES
+from pneunet.hifi.runs.solve.goal import Goal
+from pneunet.hifi.runs.solve.tables import Tables
 
 QUADRATIC_TETRA = 24
 #: dolfinx's P2 node order -> VTK's
@@ -23,9 +27,10 @@ class FieldWriter:
     solution.pvd: a killed run leaves valid files.
     """
 
-    def __init__(self, directory, problem, stretch, walls):
-        self.directory, self.problem, self.stretch, self.walls = Path(directory), problem, stretch, walls
-        self.comm = problem.mesh.comm
+    def __init__(self, directory: Path, solve: ManipulatorSolve, goal: Goal) -> None:
+        self.directory, self.goal, self.comm = directory, goal, solve.comm
+        self.problem, self.stretch, self.walls = solve.problem, solve.stretch, solve.walls
+        problem = solve.problem
         index_map = problem.displacement_space.dofmap.index_map
         self._owned = index_map.size_local
         cells = compat.cell_dofs(problem.displacement_space)[: problem.mesh.topology.index_map(3).size_local]
@@ -34,17 +39,19 @@ class FieldWriter:
         )
         self._cells = self._gather(local_to_global[cells])
         self._points = self._gather(problem.nodes[: self._owned])
-        self._wall_nodes = walls.node_numbers(local_to_global)
+        self._wall_nodes = self.walls.node_numbers(local_to_global)
         self._listed = []
 
-    def keep(self, steps):
-        """List the files of an earlier run's `steps`, (number, pressure in kPa) each; rank 0's other files of
-        steps go."""
-        names = [(pressure, f"step_{number:04d}.vtu") for number, pressure in steps]
-        self._listed = [(pressure, name) for pressure, name in names if (self.directory / name).exists()]
-        if self.comm.rank == 0:
-            self._list()
-            for old in set(self.directory.glob("step_*.vtu")) - {self.directory / name for _, name in names}:
+    def resume(self, tables: Tables) -> None:
+        """List the files of an earlier run's steps, those of the tables; other files of steps go."""
+        on_rank_0(self.comm, lambda: self._keep(tables.history()))
+
+    def _keep(self, steps):
+        names = {_name(row["step"]): self.goal.time(row["step"], row["pressure_kPa"]) for row in steps}
+        self._listed = [(time, name) for name, time in names.items() if (self.directory / name).exists()]
+        self._list()
+        for old in self.directory.glob("step_*.vtu"):
+            if old.name not in names:
                 old.unlink()
 
     def _gather(self, rows):
@@ -72,9 +79,7 @@ class FieldWriter:
         np.fmin.at(out, self._wall_nodes.ravel(), np.where(np.isfinite(distances), distances, np.nan).ravel())
         return out
 
-    def write(self, number, pressure_kPa, marks):
-        """Write the current state as step `number` at the given pressure; `marks`: {name: bool} for the
-        file's field data."""
+    def accepted(self, m: Measured) -> None:
         fields = {
             "displacement": self.problem.displacement()[: self._owned],
             "pressure": self._pressure_at_nodes()[: self._owned],
@@ -83,9 +88,9 @@ class FieldWriter:
         fields = {name: self._gather(values) for name, values in fields.items()} | {
             "wall_distance_mm": self._wall_distance()
         }
-        on_rank_0(self.comm, lambda: self._save(fields, marks, number, pressure_kPa))
+        on_rank_0(self.comm, lambda: self._save(fields, m))
 
-    def _save(self, fields, marks, number, pressure_kPa):
+    def _save(self, fields, m):
         import pyvista
         from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
@@ -95,16 +100,16 @@ class FieldWriter:
         )
         for name, values in fields.items():
             grid.point_data[name] = values.astype(np.float32)
-        for name, value in marks.items():
+        for name, value in m.touch.marks.items():
             grid.field_data[name] = np.array([value], np.int32)
-        name = f"step_{number:04d}.vtu"
+        name = _name(m.step)
         writer = vtkXMLUnstructuredGridWriter()
         writer.SetInputData(grid)
         writer.SetDataModeToBinary()
         writer.WriteToOutputStringOn()  # VTK itself crashes on a full disk
         writer.Write()
         write_text(self.directory / name, writer.GetOutputString())
-        self._listed.append((pressure_kPa, name))
+        self._listed.append((self.goal.time(m.step, m.pressure * KPA_PER_MPA), name))
         self._list()
 
     def _list(self):
@@ -114,3 +119,7 @@ class FieldWriter:
             f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n <Collection>\n{rows}'
             " </Collection>\n</VTKFile>\n",
         )
+
+
+def _name(number):
+    return f"step_{number:04d}.vtu"

@@ -1,10 +1,16 @@
 """Where a solve is to end, and the words for it on the screen and in run.json."""
 
+import math
 from dataclasses import dataclass
+from pathlib import Path
 
 from pneunet.base.errors import InputError
-from pneunet.hifi.body.manipulator import DEAD_LOADS
-from pneunet.hifi.runs.solve.tables import KPA
+from pneunet.base.units import KPA_PER_MPA
+from pneunet.geometry.designfile import DesignFile
+from pneunet.hifi.body.manipulator import DEAD_LOADS, Measured
+from pneunet.hifi.path.stepping import StepResult
+
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -18,7 +24,7 @@ class Goal:
     dead: bool
 
     @classmethod
-    def of(cls, design, pressure=None):
+    def of(cls, design: DesignFile, pressure: float | None = None) -> "Goal":
         """The design's, or another pressure (MPa); InputError when that makes no sense."""
         control = design.control
         if control.name != "pressure" and pressure is not None:
@@ -32,50 +38,56 @@ class Goal:
                 "pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads] in the design"
             )
         key, value = {
-            "pressure": ("pressure_kPa", pressure * KPA),
+            "pressure": ("pressure_kPa", pressure * KPA_PER_MPA),
             "volume": ("volume_factor", control.volume_factor),
             "arc length": ("arc_length_mm", control.arc_length),
         }[control.name]
         return cls(control.name, key, value, bool(design.loads))
 
-    def target(self, rest_volume):
-        """The control's parameter at the end: MPa, mm3 or mm."""
-        return {"pressure": self.value / KPA, "volume": self.value * rest_volume, "arc length": self.value}[
-            self.control
-        ]
+    def end(self, stage: str, rest_volume: float) -> float:
+        """The path's parameter at which `stage` is over: MPa, mm3 or mm, and 1 of the dead loads."""
+        if stage == DEAD_LOADS:
+            return 1.0
+        ends = {"pressure": self.value / KPA_PER_MPA, "volume": self.value * rest_volume}
+        return ends.get(stage, self.value)
 
-    def end(self, stage, target):
-        """The path's parameter at which `stage` is over."""
-        return 1.0 if stage == DEAD_LOADS else target
-
-    def is_last(self, stage):
+    def is_last(self, stage: str) -> bool:
         """Whether nothing comes after `stage`."""
         return stage == self.control or (self.control == "pressure" and self.value == 0)
 
+    def share(self, stage: str, parameter: float, rest_volume: float) -> float:
+        """The parameter over that at which the run ends, 1 within rounding; 0 before the last stage."""
+        if not self.is_last(stage):
+            return 0.0
+        end = self.end(stage, rest_volume)
+        share = parameter / end if end else math.inf
+        return 1.0 if abs(share - 1) <= ROUNDING else share
+
     @property
-    def noun(self):
+    def noun(self) -> str:
         return "loads" if self.is_last(DEAD_LOADS) else self.control
 
     @property
-    def table(self):
+    def table(self) -> dict[str, str | float]:
+        """run.json's part."""
         return {"control": self.control, self.key: self.value}
 
-    def time(self, step, pressure_kPa):
+    def time(self, step: int, pressure_kPa: float) -> float:
         """What ParaView lists a state under: its pressure where that grows from state to state, else its
         step."""
         return pressure_kPa if self.control == "pressure" and not self.dead else step
 
-    def where(self, stage, parameter):
+    def where(self, stage: str, parameter: float) -> str:
         """The place on the path in words."""
         if stage == DEAD_LOADS:
             return f"{parameter * 100:.4g} % of the dead loads"
         return (
-            f"{parameter * KPA:.4g} kPa"
+            f"{parameter * KPA_PER_MPA:.4g} kPa"
             if stage == "pressure"
             else f"{parameter:.4g} {'mm3' if stage == 'volume' else 'mm'}"
         )
 
-    def plan(self):
+    def plan(self) -> str:
         """What will be walked, in words."""
         inflation = f"{self.key} to {self.value:g}"
         return (
@@ -86,32 +98,13 @@ class Goal:
             else inflation
         )
 
-    def done(self, m, stage, parameter):
+    def done(self, m: Measured, stage: str, parameter: float) -> str:
         """The last line's beginning, of the last state, and what makes it doubtful."""
-        pressure = f" at {m.pressure * KPA:.4g} kPa" * (stage in ("volume", "arc length"))
+        pressure = f" at {m.pressure * KPA_PER_MPA:.4g} kPa" * (stage in ("volume", "arc length"))
         return f"done: {self.where(stage, parameter)}{pressure}" + f"; {m.touch.text}" * bool(m.touch.text)
 
-    def progress(self, m, stage, done, breaks_at):
-        """The line of an accepted state (hifi.body.manipulator.Measured), `done` of the whole stage."""
-        eta = m.seconds / done * (1 - done)
-        warning = "".join(f"  {word.upper()}" for word in m.touch.warnings)
-        if m.unstable:
-            warning += f"  UNSTABLE in {m.unstable}"
-        if m.largest_stretch > breaks_at:
-            warning += f"  BEYOND BREAK (stretch {breaks_at:.2f})"
-        place = (
-            f"{m.pressure * KPA:7.2f} kPa" if stage != DEAD_LOADS else f"{m.dead_loads * 100:3.0f} % loads"
-        )
-        place += f"  {m.volume:9.1f} mm3" * (self.control != "pressure")
-        return (
-            f"step {m.step:3d}  {place}  {m.iterations:2d} iterations  {m.factorisations} factorisations "
-            f" stretch {m.largest_stretch:.2f}  wall distance {m.touch.wall_distance:.2f} mm "
-            f" {m.seconds:6.1f} s  ETA {eta:5.0f} s{warning}"
-        )
-
-    def failure(self, m, stage, parameter, result, out):
-        """Why the run ended short of its goal, where its data are, and what to try; m: its last state,
-        `result`: hifi.path.stepping.StepResult."""
+    def failure(self, m: Measured, stage: str, parameter: float, result: StepResult, out: Path) -> str:
+        """Why the run ended short of its goal, where its data are, and what to try; m: its last state."""
         if stage == DEAD_LOADS:
             why, remedy = "buckling or too coarse a mesh", "smaller [loads] or a smaller mesh_size_mm"
         else:

@@ -1,89 +1,83 @@
 """Tables of a solve: one row, or block of rows, for each accepted step."""
 
 from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_csv, write_csv
-from pneunet.hifi.contact.touch import KPA, MARKS, Load
+from pneunet.base.files.schemas import CENTRELINES, MARKS, SEGMENTS, STEPS, WALLS
+from pneunet.base.units import KPA_PER_MPA
+from pneunet.hifi.body.manipulator import Measured
+from pneunet.hifi.contact.touch import Load
+from pneunet.hifi.fem.agreement import on_rank_0
 
-STEPS = [
-    *"step pressure_kPa iterations factorisations volume_mm3 tip_x_mm tip_y_mm tip_z_mm".split(),
-    *["smallest_wall_distance_mm", MARKS[0], "body_distance_mm", MARKS[1], "contact_force_N"],
-    *"largest_stretch unstable_directions dead_load_fraction stability_factorisations seconds".split(),
-]
-TABLES = {
-    "steps": STEPS,
-    "centrelines": [*"step pressure_kPa s_mm x_mm y_mm z_mm".split(), *MARKS],
-    "segments": [*"step pressure_kPa segment e1 e2 e3 k1_rad_per_mm k2_per_mm k3_per_mm".split(), *MARKS],
-}
+COLUMNS = {"steps": STEPS, "centrelines": CENTRELINES, "segments": SEGMENTS}
 
 
-class ResultFiles:
-    """CSV files of a run, rewritten whole after every accepted step so that a kill leaves them valid. Rank 0
-    only."""
+class Tables:
+    """CSV files of a run, rewritten whole after every accepted step so that a kill leaves them valid; their
+    rows are known to rank 0 alone. gaps: (segment, side, number, width in mm) of each row of walls.csv."""
 
-    def __init__(self, directory, gaps):
-        self.directory, self.gaps = Path(directory), gaps
-        self.steps, self.centrelines, self.segments = [], [], []
+    def __init__(self, comm: MPI.Comm, directory: Path, gaps: list[tuple]) -> None:
+        self.comm, self.directory, self.gaps = comm, directory, gaps
+        self.rows: dict[str, list] = {name: [] for name in COLUMNS}
 
-    def keep(self, last):
-        """Go on from an earlier run's files: its rows up to step `last`. InputError when they are of another
-        version's making."""
-        for name, columns in TABLES.items():
-            header, rows = read_csv(self.directory / f"{name}.csv")
-            if header != columns:
-                raise InputError(
-                    f"{self.directory / name}.csv: has not the columns of this version: solve without"
-                    " --resume"
-                )
-            setattr(self, name, [row for row in rows if int(row[0]) <= last])
+    def resume(self, last: int) -> list[tuple]:
+        """Go on from an earlier run's files, with its rows up to step `last`; collective.
 
-    def watched(self):
-        """(Load, wall distance, body distance, contact force) of the steps kept, for a
-        hifi.contact.touch.TouchWatch."""
-        distances = "smallest_wall_distance_mm body_distance_mm".split()
-        columns = ["pressure_kPa", "dead_load_fraction", *distances, "contact_force_N"]
-        rows = [[float(row[STEPS.index(name)]) for name in columns] for row in self.steps]
-        return [(Load(p / KPA, dead), *seen) for p, dead, *seen in rows]
+        Returns (Load, wall distance, body distance, contact force) of these steps, for a
+        hifi.contact.touch.TouchWatch. InputError when the files are of another version's making.
+        """
+        return on_rank_0(self.comm, lambda: self._read(last))
 
-    def history(self):
-        """run.json's list of the steps kept."""
+    def _read(self, last: int) -> list[tuple]:
+        for name, columns in COLUMNS.items():
+            path = self.directory / f"{name}.csv"
+            header, rows = read_csv(path)
+            if tuple(header) != columns:
+                raise InputError(f"{path}: has not the columns of this version: solve without --resume")
+            self.rows[name] = [row for row in rows if int(row[0]) <= last]
+        seen = ("smallest_wall_distance_mm", "body_distance_mm", "contact_force_N")
         return [
-            {
-                "step": int(row[0]),
-                "pressure_kPa": float(row[1]),
-                "iterations": int(row[2]),
-                "factorisations": int(row[3]),
-                "stability_factorisations": int(row[STEPS.index("stability_factorisations")]),
-                **{name: bool(int(row[STEPS.index(name)])) for name in MARKS},
-            }
-            for row in self.steps
+            (
+                Load(float(step["pressure_kPa"]) / KPA_PER_MPA, float(step["dead_load_fraction"])),
+                *(float(step[name]) for name in seen),
+            )
+            for step in self._steps()
         ]
 
-    def add(self, m):
-        p = m.pressure * KPA
+    def _steps(self) -> list[dict[str, Any]]:
+        return [dict(zip(STEPS, row)) for row in self.rows["steps"]]
+
+    def history(self) -> list[dict[str, float | bool]]:
+        """run.json's list of the steps; rank 0."""
+        counts = ("iterations", "factorisations", "stability_factorisations")
+        return [
+            {
+                "step": int(step["step"]),
+                "pressure_kPa": float(step["pressure_kPa"]),
+                **{name: int(step[name]) for name in counts},
+                **{name: bool(int(step[name])) for name in MARKS},
+            }
+            for step in self._steps()
+        ]
+
+    def accepted(self, m: Measured) -> None:
+        on_rank_0(self.comm, lambda: self._write(m))
+
+    def _write(self, m: Measured) -> None:
         tip, touch, marks = m.frames[-1, :3, 3], m.touch, [int(holds) for holds in m.touch.marks.values()]
-        row = [m.step, p, m.iterations, m.factorisations, m.volume, *tip]
+        at = [m.step, m.pressure * KPA_PER_MPA]
+        row = [*at, m.iterations, m.factorisations, m.volume, *tip]
         row += [touch.wall_distance, marks[0], touch.body_distance, marks[1], touch.contact_force]
         row += [m.largest_stretch, m.unstable, m.dead_loads, m.stability_factorisations, m.seconds]
-        self.steps.append(row)
-        self.centrelines += [[m.step, p, s, *g[:3, 3], *marks] for s, g in zip(m.stations, m.frames)]
-        for i, (e, k) in enumerate(zip(m.strains.e, m.strains.k), start=1):
-            self.segments.append([m.step, p, i, *e, *k, *marks])
-        for name, columns in TABLES.items():
-            write_csv(self.directory / f"{name}.csv", columns, getattr(self, name))
-        write_csv(
-            self.directory / "walls.csv",
-            "segment side gap gap_mm distance_mm".split(),
-            [[*gap, d] for gap, d in zip(self.gaps, m.walls)],
-        )
-
-
-def limit_text(point):
-    """A hifi.path.equilibrium.LimitPoint of the pressure in words."""
-    return f"limit point: pressure {point.load * KPA:.4g} kPa ({point.kind}) at volume {point.volume:.4g} mm3"
-
-
-def limit_table(point):
-    """The same for run.json."""
-    return {"pressure_kPa": point.load * KPA, "volume_mm3": point.volume, "kind": point.kind}
+        self.rows["steps"].append(row)
+        self.rows["centrelines"] += [[*at, s, *g[:3, 3], *marks] for s, g in zip(m.stations, m.frames)]
+        strains = enumerate(zip(m.strains.e, m.strains.k), start=1)
+        self.rows["segments"] += [[*at, i, *e, *k, *marks] for i, (e, k) in strains]
+        for name, columns in COLUMNS.items():
+            write_csv(self.directory / f"{name}.csv", columns, self.rows[name])
+        walls = [[*gap, distance] for gap, distance in zip(self.gaps, m.walls)]
+        write_csv(self.directory / "walls.csv", WALLS, walls)

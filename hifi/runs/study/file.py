@@ -8,22 +8,24 @@ can be varied.
 import copy
 import itertools
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, file_key, number, read_toml, refuse_unknown
+from pneunet.base.files.toml import as_table, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import LAWS
+from pneunet.base.quantities import quantities
 from pneunet.base.system.processes import Limits
 from pneunet.geometry.designfile import design_from_tables, design_tables
 from pneunet.geometry.parameters import Segment
 from pneunet.hifi.cell.file import cell_from_tables, cell_tables
 from pneunet.hifi.runs.cases import Case
 
-KINDS = ("cell", "segment", "manipulator")
-SEGMENT_KEYS = [file_key(f) for f in fields(Segment) if "unit" in f.metadata]
+BODIES = ("cell", "segment", "manipulator")
+SEGMENT_KEYS = list(quantities(Segment))
 MATERIAL_KEYS = ["silicone", "law"] + sorted(
-    {file_key(f) for law in LAWS.values() for f in fields(law)} - {"name", "source"}
+    {key for law in LAWS.values() for key in quantities(law)} - {"name", "source"}
 )
 #: keys which say what a material is: the table that stood there before means nothing any more
 NAMES_OF_MATERIALS = ("silicone", "law")
@@ -40,12 +42,12 @@ class StudyCase:
     """One row of the list or grid: {variable as the user wrote it: value}, its case, or why there can be
     none."""
 
-    values: dict
+    values: dict[str, Any]
     case: Case | None
     refusal: str = ""
 
     @property
-    def label(self):
+    def label(self) -> str:
         return ", ".join(f"{name} = {value}" for name, value in self.values.items()) or "the body as it is"
 
 
@@ -54,12 +56,12 @@ class Study:
     """cases: StudyCase in order; variables: names of what is varied; limits: of one case."""
 
     kind: str
-    variables: tuple
-    cases: tuple
+    variables: tuple[str, ...]
+    cases: tuple[StudyCase, ...]
     limits: Limits
 
 
-def read_study(path):
+def read_study(path: str | Path) -> Study:
     """The Study in a TOML file; InputError that names key and fix otherwise.
 
     A combination of the grid that is no valid body is kept with its refusal, a listed case or a whole grid of
@@ -74,7 +76,7 @@ def read_study(path):
             raise InputError(f"{where}: key '{key}' is missing: {fix}")
     refuse_unknown(data, ["kind", "base", "levels", "limits", "grid", "case"], where)
     kind = data["kind"]
-    if kind not in KINDS:
+    if kind not in BODIES:
         raise InputError(f"{where}: kind = {kind!r} is not known: write 'cell', 'segment' or 'manipulator'")
     base = _base(data["base"], kind, Path(path))
     levels = number(data.get("levels", base.get("levels", DEFAULT_LEVELS)), "levels", where, integer=True)
@@ -214,7 +216,7 @@ def _limits(table, where):
     return Limits(table.get("time_s", DEFAULT_TIME), table.get("memory_MB"))
 
 
-def value_of(name, study_case, default=""):
+def value_of(name: str, study_case: StudyCase, default: object = "") -> Any:
     """What the column of variable `name` shows: the case's value, or the body's where other cases vary it."""
     if name in study_case.values or study_case.case is None:
         return study_case.values.get(name, default)

@@ -1,11 +1,14 @@
 """study.png: twist and curvatures of every case over the pressure."""
 
+from pathlib import Path
+
 import numpy as np
 
 from pneunet.base.files.atomic import atomic_path
 from pneunet.hifi.contact.touch import marked
 from pneunet.hifi.runs.case_process import DONE
-from pneunet.hifi.runs.study.file import value_of
+from pneunet.hifi.runs.study.file import Study, value_of
+from pneunet.hifi.runs.study.study import StudyTable
 
 PANELS = (
     ("k_norm_per_mm", "|k| (1/m)"),
@@ -27,7 +30,7 @@ OVERLAP = {
 MARKERS = ("", "o", "s", "^")
 
 
-def draw(study, table, path):
+def draw(study: Study, table: StudyTable, path: str | Path) -> bool:
     """Draw the levels of a StudyTable to `path`: colour tells the first variable, line and marker the others.
     False: no levels."""
     from matplotlib.figure import Figure

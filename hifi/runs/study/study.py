@@ -1,26 +1,33 @@
 """`pneunet study`: cells, segments or manipulators over a list or grid of anything in them; one table and one
 picture."""
 
+import logging
 import time
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import output_directory, read_csv, write_csv
 from pneunet.base.files.record import write_record
-from pneunet.hifi.contact.touch import MARKS, marked
+from pneunet.base.files.schemas import CASE, ENDING, MARKS
+from pneunet.hifi.contact.touch import marked
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.runs.case_process import REFUSED
-from pneunet.hifi.runs.cases import run_cases
-from pneunet.hifi.runs.study.file import read_study, value_of
+from pneunet.hifi.runs.cases import Case, run_cases
+from pneunet.hifi.runs.study.file import Study, StudyCase, read_study, value_of
+
+log = logging.getLogger(__name__)
 
 #: a case's rows, written by hifi.runs.study.cases
 LEVELS = "levels.csv"
 
 
-def run_study(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False):
+def run_study(
+    path: str | Path, directory: str | Path, comm: MPI.Comm = MPI.COMM_WORLD, retry: bool = False
+) -> tuple[Study, "StudyTable"]:
     """Compute the cases of STUDY.toml that are not finished in `directory`; collective. Returns the Study and
     the StudyTable.
 
@@ -28,28 +35,16 @@ def run_study(path, directory, comm=MPI.COMM_WORLD, say=print, retry=False):
     run.json and cases/NAME. retry: see hifi.runs.cases.run_cases. InputError on bad input before anything is
     computed.
     """
-    say, directory, started = (
-        say if comm.rank == 0 else (lambda text: None),
-        Path(directory),
-        time.perf_counter(),
-    )
+    directory, started = Path(directory), time.perf_counter()
     study = on_rank_0(comm, lambda: read_study(path))
     on_rank_0(comm, lambda: output_directory(directory) and None)
     for text in _announcement(study, comm.size):
-        say(text)
+        log.info(text)
     table = StudyTable(study, directory)
-    records = run_cases(
-        [c.case for c in study.cases if c.case],
-        directory / "cases",
-        study.limits,
-        comm,
-        say,
-        table.add,
-        retry,
-    )
-    on_rank_0(
-        comm, lambda: _finish(study, table, records, directory, comm.size, time.perf_counter() - started, say)
-    )
+    cases = [c.case for c in study.cases if c.case]
+    records = run_cases(cases, directory / "cases", study.limits, comm, table.add, retry)
+    seconds = time.perf_counter() - started
+    on_rank_0(comm, lambda: _finish(study, table, records, directory, comm.size, seconds))
     return study, table
 
 
@@ -63,7 +58,7 @@ def _announcement(study, ranks):
         yield f"{len(refused)} of them are no valid body, the first: {refused[0].refusal}"
 
 
-def _finish(study, table, records, directory, ranks, seconds, say):
+def _finish(study, table, records, directory, ranks, seconds):
     from pneunet.hifi.runs.study.picture import draw
 
     table.write()
@@ -80,21 +75,19 @@ def _finish(study, table, records, directory, ranks, seconds, say):
             f"; {overlapping} OVERLAP, without a contact model, at their higher pressures (columns"
             f" {', '.join(MARKS)})"
         )
-    say(
-        f"{summary}; table in {directory / 'study.csv'}"
-        + (f", picture {directory / 'study.png'}" if picture else "")
-    )
+    drawn = f", picture {directory / 'study.png'}" if picture else ""
+    log.info(f"{summary}; table in {directory / 'study.csv'}{drawn}")
 
 
 class StudyTable:
     """study.csv: for each case that is known one row a pressure level, or one without levels. In order of the
     study."""
 
-    def __init__(self, study, directory):
+    def __init__(self, study: Study, directory: str | Path) -> None:
         self.study, self.directory = study, Path(directory)
         self._known = {}  # case name -> (record, [{column: text} of a level])
 
-    def add(self, case, record):
+    def add(self, case: Case, record: dict[str, Any]) -> None:
         """Take a record with what levels.csv of the case says; rewrites study.csv. InputError when that
         cannot be written."""
         path = self.directory / "cases" / case.name / LEVELS
@@ -102,18 +95,19 @@ class StudyTable:
         self._known[case.name] = (record, [dict(zip(header, row)) for row in rows])
         self.write()
 
-    def of(self, study_case):
+    def of(self, study_case: StudyCase) -> tuple[dict[str, Any], list[dict[str, str]]] | None:
         """(record, levels) of a StudyCase; a refused one has a record too. None while it is not known."""
         if study_case.case is None:
             return {"status": REFUSED, "reason": study_case.refusal, "seconds": "", "peak_memory_MB": ""}, []
         return self._known.get(study_case.case.name)
 
-    def overlapping(self):
+    def overlapping(self) -> int:
         """Number of the study's cases in which something overlaps at some level."""
         known = [self.of(case) for case in self.study.cases]
         return sum(any(marked(level) for level in levels) for _, levels in filter(None, known))
 
-    def write(self):
+    def write(self) -> None:
+        """Write study.csv of what is known; InputError when that cannot be written."""
         study = self.study
         columns = list(
             dict.fromkeys(name for _, levels in self._known.values() for level in levels for name in level)
@@ -135,7 +129,7 @@ class StudyTable:
         try:
             write_csv(
                 self.directory / "study.csv",
-                ["case", *named, *columns, "status", "reason", "case_seconds", "case_memory_MB"],
+                [*CASE, *named, *columns, *ENDING],
                 rows,
             )
         except OSError as error:

@@ -7,20 +7,32 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.base.strains import RodStrains
 from pneunet.geometry import Manipulator, Segment
-from pneunet.reduced import AnalyticModel, QuadraticLaw, Rod, predict
-from pneunet.reduced.model import SegmentLaw, doubts
-from pneunet.reduced.rod.ends import free_manipulator
+from pneunet.geometry.loading import DeadLoads
+from pneunet.reduced import (
+    AnalyticLaw,
+    QuadraticLaw,
+    Rod,
+    SectionLaw,
+    SegmentLaw,
+    doubts,
+    predict,
+    shipped_law,
+)
+from pneunet.reduced.rod.ends import free_pieces
+from pneunet.reduced.rod.laws import FreeSection
 
 TWISTING = Segment("twisting", 60.0, 4, cavity_floor=0.5)
 BENDING = Segment("one-sided", 90.0, 3)
 HELICAL = Segment("one-sided", 60.0, 6)
 ARM = Manipulator((TWISTING, BENDING, HELICAL))
+QUADRATIC = QuadraticLaw([0.0, 0.05], [[1, 0, 0, 0, 0, 0], [1.1, -0.02, 0, 0.02, 0.03, 0]], [np.eye(6)] * 2)
+#: every law that there is
+LAWS = {"trained": shipped_law, "analytic": AnalyticLaw, "quadratic": lambda: QUADRATIC}
 
 
 def test_shapes_follow_the_pressures_and_calls_agree():
-    model = AnalyticModel()
+    model = AnalyticLaw()
     grid = np.array([[0.0, 0.02], [0.03, 0.01]])
     for segment in (TWISTING, HELICAL):
         strains = model.strains(segment, grid)
@@ -34,19 +46,19 @@ def test_shapes_follow_the_pressures_and_calls_agree():
 def test_twisting_segments_twist_like_their_layers_and_do_not_bend():
     """Chambers on top at angle < 90 shear the upper layer by eps_xy < 0, and twist gives eps_xy = -k1 z/2: k1
     > 0."""
-    strains = AnalyticModel().strains(TWISTING, 0.02)
+    strains = AnalyticLaw().strains(TWISTING, 0.02)
     assert strains.k[0] > 0
     np.testing.assert_array_equal(strains.k[1:], 0.0)
-    np.testing.assert_allclose(AnalyticModel().strains(TWISTING.mirrored, 0.02).k, -strains.k, rtol=1e-9)
+    np.testing.assert_allclose(AnalyticLaw().strains(TWISTING.mirrored, 0.02).k, -strains.k, rtol=1e-9)
 
 
 def test_cells_count_with_whole_pitches_and_frames_are_continuous():
-    line = predict(ARM, 0.03, AnalyticModel())
+    line = predict(ARM, 0.03, AnalyticLaw())
     assert line.s[-1] == pytest.approx(ARM.length)
     ends = np.concatenate([ARM.starts, ARM.starts + [s.length for s in ARM.segments]])
     assert all(np.isclose(line.s, end).any() for end in ends)
-    free = AnalyticModel().each(ARM.segments, 0.03)
-    lengths, strains = free_manipulator(ARM.segments, free, [s.chambers for s in ARM.segments])
+    free = AnalyticLaw().each(ARM.segments, 0.03)
+    lengths, strains = free_pieces(ARM.segments, free)
     assert lengths[1::3] == pytest.approx([s.chambers * s.pitch for s in ARM.segments])
     assert sum(lengths) == pytest.approx(ARM.length)
     # bare core: no stretch, no twist, no bending but that of a slanted end
@@ -56,33 +68,55 @@ def test_cells_count_with_whole_pitches_and_frames_are_continuous():
         assert [bool(k) for k in strains.k[ends, 2]] == [False, False, True]
 
 
-def test_a_free_rod_and_a_prediction_are_the_same():
-    model = AnalyticModel()
-    laws = [
-        QuadraticLaw([0.03], [np.hstack([q.e, q.k])], np.eye(6)[None])
-        for q in (model.strains(s, 0.03) for s in ARM.segments)
-    ]
-    np.testing.assert_allclose(
-        Rod.of(ARM, laws, 0.03).free().points[-1], predict(ARM, 0.03, model).points[-1], atol=1e-9
-    )
+@pytest.mark.parametrize("name", LAWS)
+def test_a_free_rod_and_a_prediction_are_the_same(name):
+    law, base = LAWS[name](), np.diag([-1.0, -1.0, 1.0, 1.0])
+    assert isinstance(law, SegmentLaw) and law.name == name
+    assert all(isinstance(law.of(segment), SectionLaw) for segment in ARM.segments)
+    rod, line = Rod.of(ARM, law, 0.03, base), predict(ARM, 0.03, law, 2.0, base)
+    np.testing.assert_allclose(rod.free(2.0).s, line.s, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rod.free(2.0).poses, line.poses, rtol=0, atol=1e-12)
+    known = [piece.law.free_strains(piece.pressure) for piece in rod.pieces]
+    np.testing.assert_allclose(rod.free_strains.vector, known, rtol=0, atol=1e-10)
+
+
+def test_laws_may_be_one_for_each_segment():
+    laws = [shipped_law(), QUADRATIC, AnalyticLaw()]
+    free = Rod.of(ARM, laws, [0.01, 0.02, 0.03]).free_strains.vector[1::3]
+    expected = [law.strains(s, P).vector for law, s, P in zip(laws, ARM.segments, (0.01, 0.02, 0.03))]
+    assert free == pytest.approx(np.array(expected))
+
+
+def test_a_law_of_free_shapes_alone_says_so_when_it_is_asked_for_more():
+    section = AnalyticLaw().of(HELICAL)
+    q = section.free_strains(0.02)
+    for ask in (section.psi, section.force, section.stiffness):
+        with pytest.raises(InputError, match="'analytic' knows free shapes alone.*take the trained law"):
+            ask(q, 0.02)
+    with pytest.raises(InputError, match="knows free shapes alone"):
+        Rod.of(ARM, AnalyticLaw(), 0.02).equilibrium(DeadLoads((0.0, 0.0, -9810.0)))
 
 
 def test_no_pressure_no_shape_change():
-    line = predict(ARM, 0.0, AnalyticModel())
+    line = predict(ARM, 0.0, AnalyticLaw())
     np.testing.assert_allclose(line.points, np.stack([line.s, 0 * line.s, 0 * line.s], axis=1), atol=1e-9)
 
 
 def test_mirrored_manipulators_have_mirrored_centrelines():
-    one, other = (predict(arm, 0.03, AnalyticModel()).points for arm in (ARM, ARM.mirrored))
+    one, other = (predict(arm, 0.03, AnalyticLaw()).points for arm in (ARM, ARM.mirrored))
     np.testing.assert_allclose(other, one * [1, -1, 1], atol=1e-8)
 
 
 def test_any_law_with_strains_can_predict():
+    class Section(FreeSection):
+        def free_strains(self, P):
+            return np.array([1 + P, 0, 0, 0, 0, 0])
+
     class Law(SegmentLaw):
         name = "constant"
 
-        def strains(self, segment, pressure):
-            return RodStrains([1 + pressure, 0, 0], [0, 0, 0])
+        def of(self, segment):
+            return Section(self.name)
 
         def doubts(self, segment, pressure):
             return ("it is made up",) if segment.kind == "one-sided" else ()
@@ -96,13 +130,13 @@ def test_any_law_with_strains_can_predict():
 @pytest.mark.parametrize("pressure", [-0.01, np.nan])
 def test_bad_pressure(pressure):
     with pytest.raises(InputError, match="pressure_kPa"):
-        AnalyticModel().strains(HELICAL, pressure)
+        AnalyticLaw().strains(HELICAL, pressure)
 
 
 def test_distance_from_finite_elements():
     """Cell results of the cases one-sided-w10 and twist-w12 (docs/theory-reduced.md): not fitted, so only
     near."""
-    model = AnalyticModel()
+    model = AnalyticLaw()
     size = {"width": 10.0, "channel_width": 2.0, "material": NeoHookean(mu=0.2068)}
     helical = model.strains(Segment("one-sided", 60.0, 5, **size), 0.05)
     bending = model.strains(Segment("one-sided", 90.0, 5, **size), 0.05)
