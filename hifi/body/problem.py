@@ -14,10 +14,10 @@ from petsc4py import PETSc
 
 from pneunet.hifi.contact.gaps import Contact
 from pneunet.hifi.fem import compat
-from pneunet.hifi.fem.loads import Load, Pressure
+from pneunet.hifi.fem.loads import AppliedLoad, Pressure
 from pneunet.hifi.fem.materials import Materials, energy_density, groups
 from pneunet.hifi.fem.mixed_field import MixedField
-from pneunet.hifi.fem.potential import Potential, Term
+from pneunet.hifi.fem.potential import PotentialEnergy, Term
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class BodyProblem(MixedField):
         facet_tags: compat.MeshTags,
         materials: Materials,
         supports: list[Support],
-        loads: Sequence[Load] = (),
+        loads: Sequence[AppliedLoad] = (),
     ):
         super().__init__(mesh, cell_tags, facet_tags)
         self.supports = list(supports)
@@ -63,7 +63,7 @@ class BodyProblem(MixedField):
         self.contact = Contact(mesh.comm, self.dofs, self.owned_range)
         self.symmetric = all(load.closed for load in self.loads)
         self.deformation_gradient = F = ufl.Identity(3) + ufl.grad(self.u)
-        self._potential = Potential(
+        self._potential = PotentialEnergy(
             self,
             [
                 Term(energy_density(mesh, material, F, self.p), self.cells(*tags))

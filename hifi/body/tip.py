@@ -5,6 +5,7 @@ import numpy as np
 from dolfinx import fem
 
 from pneunet.base.errors import ConvergenceError
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry import tags
 from pneunet.geometry.loading import DeadLoads
 from pneunet.hifi.body.manipulator import ManipulatorSolve
@@ -47,7 +48,7 @@ def stiffness(solve):
     frame = solve.sections.frames()[-1]
     K = np.linalg.inv(compliance(solve.system, tags.TIP, frame))
     return {
-        "pressure_kPa": float(solve.pressure.value.value) * 1e3,
+        "pressure_kPa": float(solve.pressure.value.value) * KPA_PER_MPA,
         **solve.measure().touch.marks,
         "rows": (
             "force_N, moment_N_mm; columns: displacement_mm, rotation_rad; in axes and about origin of the"
@@ -80,7 +81,7 @@ def blocked_force(manipulator, mesh_path, pressure, loads, comm, contact=None):
     measured = held.measure()
     held.destroy()
     return {
-        "pressure_kPa": measured.pressure * 1e3,
+        "pressure_kPa": measured.pressure * KPA_PER_MPA,
         "reached": reached,
         **measured.touch.marks,
         "force_N": (-force).tolist(),

@@ -33,7 +33,7 @@ from pneunet.hifi.fem import compat, surface
 from pneunet.hifi.fem.compat import compile_form
 from pneunet.hifi.fem.materials import energy_density
 from pneunet.hifi.fem.mixed_field import MixedField
-from pneunet.hifi.fem.potential import Potential, Term
+from pneunet.hifi.fem.potential import PotentialEnergy, Term
 from pneunet.hifi.fem.stretch import PrincipalStretch
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
@@ -131,7 +131,7 @@ class CellProblem(MixedField):
                 ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c)
             )
             terms.append(Term(self.medium.density(F, second, mu), self.cells(tags.GAP)))
-        self._potential = Potential(self, terms)
+        self._potential = PotentialEnergy(self, terms)
         t = ufl.TestFunction(compat.cell_vectors(self.mesh, 6))
         slopes = [(ufl.diff(term.density, q), term.measure) for term in terms]
         along = [(ufl.inner(slope, self._direction), d) for slope, d in slopes]

@@ -14,7 +14,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
 from pneunet.hifi.verification import bodies, closed_forms
-from pneunet.hifi.verification.following import Comparison
+from pneunet.hifi.verification.following import ExactComparison
 
 CURVATURES = (0.1, 0.25, 0.5)
 REST = np.eye(6)[0]
@@ -50,8 +50,8 @@ def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
     torque, axial = closed_forms.torsion(stretch, twist)
     told, at = (f"h = {size:g}", problem.unknowns), f"at lambda = {stretch:g}, psi = {twist:g}"
     return [
-        Comparison("cell: solid cylinder", f"torque {at}", *told, torque, state.moment[0]),
-        Comparison("cell: solid cylinder", f"axial force {at}", *told, axial, state.force[0]),
+        ExactComparison("cell: solid cylinder", f"torque {at}", *told, torque, state.moment[0]),
+        ExactComparison("cell: solid cylinder", f"axial force {at}", *told, axial, state.force[0]),
     ]
 
 
@@ -70,7 +70,7 @@ def flexure(cells=(2, 16), pitch=0.2, thickness=0.07):
         state = held_at(problem, held, np.array([1.0, 0, 0, 0, k, 0]))
         told = f"{cells[0]} x 1 x {cells[1]}", problem.unknowns
         rows.append(
-            Comparison(
+            ExactComparison(
                 "cell: flexed block",
                 f"M at k = {k:g}",
                 *told,

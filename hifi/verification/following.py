@@ -17,7 +17,7 @@ from pneunet.hifi.path.stepping import StepSize, run_steps
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ExactComparison:
     """One number computed and exact; case and quantity in words, mesh by its resolution."""
 
     case: str

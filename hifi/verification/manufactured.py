@@ -11,7 +11,7 @@ import ufl
 
 from pneunet.hifi.body.problem import Support
 from pneunet.hifi.fem import compat
-from pneunet.hifi.fem.loads import Load
+from pneunet.hifi.fem.loads import AppliedLoad
 from pneunet.hifi.fem.mixed_field import MixedField
 from pneunet.hifi.verification import bodies
 from pneunet.hifi.verification.following import body_system, solve_from
@@ -37,7 +37,7 @@ def exact(X):
     return u, F, q, q + ufl.inner(F, F) / 3
 
 
-class Exact(Load):
+class Exact(AppliedLoad):
     """The force in the body and the traction on its face x = 1 that the exact deformation needs."""
 
     def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:

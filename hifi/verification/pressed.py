@@ -18,7 +18,7 @@ from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.verification import bodies
 from pneunet.hifi.verification.cells import held_at
-from pneunet.hifi.verification.following import Comparison
+from pneunet.hifi.verification.following import ExactComparison
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def exact_force(row, stretch, law):
 
 
 def pressed(folder, size=0.35, stretch=0.8, twist=0.25):
-    """(Comparison of the axial force, torque in N mm, CellState)."""
+    """(ExactComparison of the axial force, torque in N mm, CellState)."""
     row, penalty = Row(), WallPenalty()
     mesh, cells, facets = bodies.round_body(folder, "cylinder", size, tags.BODY)
     ends = np.isin(facets.values, (bodies.PLANE_X, bodies.END))
@@ -67,4 +67,4 @@ def pressed(folder, size=0.35, stretch=0.8, twist=0.25):
         problem.unknowns,
     )
     exact = exact_force(row, stretch, penalty.on(row.material.mu, row.gap))
-    return Comparison(*told, exact, state.force[0]), float(state.moment[0]), state
+    return ExactComparison(*told, exact, state.force[0]), float(state.moment[0]), state
