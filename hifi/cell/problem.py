@@ -90,18 +90,18 @@ class CellProblem(MixedField):
         )
         self._bordered = None
 
-    def move(self, segment, vertices):
+    def move(self, segment: Segment, vertices: np.ndarray) -> None:
         """Make this the cell of another segment, on the same mesh with its vertices (n, 3) elsewhere."""
         self.segment, self.mesh.geometry.x[:] = segment, vertices
         self._place()
 
     @property
-    def placement(self):
+    def placement(self) -> tuple[np.ndarray, dict]:
         """All that `move` changes; assigned, it brings the cell back."""
         return self.mesh.geometry.x.copy(), {name: getattr(self, name) for name in _PLACED}
 
     @placement.setter
-    def placement(self, kept):
+    def placement(self, kept: tuple[np.ndarray, dict]) -> None:
         self.mesh.geometry.x[:], placed = kept
         vars(self).update(placed)
 
@@ -204,7 +204,7 @@ class CellProblem(MixedField):
                 ).tocsr()
         self.gauge = gauge
 
-    def expand(self, values):
+    def expand(self, values: np.ndarray) -> np.ndarray:
         """State array of the mixed space from the unknowns (unknowns,)."""
         return np.where(self.reduced >= 0, values[self.reduced], 0.0)
 

@@ -4,16 +4,21 @@ them (mm).
 Faces are tagged alike: the planes x, y, z = 0, the inner and the outer surface of a round body, the far ends.
 """
 
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
 import numpy as np
-from dolfinx.mesh import CellType, create_box, locate_entities_boundary, meshtags
+from dolfinx.mesh import CellType, Mesh, create_box, locate_entities_boundary, meshtags
 from mpi4py import MPI
 
 from pneunet.hifi.fem import compat
 
+#: (mesh, cell tags, facet tags)
+TaggedMesh = tuple[Mesh, compat.MeshTags, compat.MeshTags]
 INNER, PLANE_X, PLANE_Y, PLANE_Z, OUTER, END, END_Y, END_Z = range(1, 9)
 
 
-def round_body(folder, name, size, solid=1):
+def round_body(folder: Path, name: str, size: float, solid: int = 1) -> TaggedMesh:
     """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or
     axis; solid: tag of its cells."""
     import gmsh
@@ -96,7 +101,12 @@ ROUND = {
 }
 
 
-def box(lengths, counts, move=None, solid=1):
+def box(
+    lengths: Sequence[float],
+    counts: Sequence[int],
+    move: Callable[[np.ndarray], np.ndarray] | None = None,
+    solid: int = 1,
+) -> TaggedMesh:
     """(mesh, cell tags, facet tags) of a box from the origin, each of its (nx, ny, nz) bricks cut into 6
     tetrahedra.
 
@@ -126,6 +136,6 @@ def box(lengths, counts, move=None, solid=1):
     )
 
 
-def strip(lengths, counts):
+def strip(lengths: Sequence[float], counts: Sequence[int]) -> TaggedMesh:
     """A box along x whose axis runs through the middle of its section."""
     return box(lengths, counts, lambda X: X - [0.0, lengths[1] / 2, lengths[2] / 2])

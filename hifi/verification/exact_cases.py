@@ -1,6 +1,8 @@
 """Cases with exact solutions: each a function of its mesh's resolution that returns a list of
 `ExactComparison`."""
 
+from pathlib import Path
+
 import numpy as np
 from scipy.optimize import root_scalar
 
@@ -26,7 +28,9 @@ CAPPED_PRESSURES = (0.1, 0.2, 0.3, 0.4, 0.5)
 FLEXURE_CURVATURES = (0.1, 0.25, 0.5, 1.0, 1.5)
 
 
-def sphere(folder, size=0.19):
+def sphere(
+    folder: Path, size: float = 0.19
+) -> tuple[list[ExactComparison], list[ExactComparison], list[int]]:
     """(radii at given pressures, pressures at given radii up to and past the limit, unstable directions at
     the latter).
 
@@ -81,7 +85,7 @@ class _Tube:
         return 4 * self.system.problem.reaction(bodies.END)[0][0]
 
 
-def tube(folder, size=0.25):
+def tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
     """Inner radii of the tube held at its length."""
     held = _Tube(folder, size)
     radii = follow(held.system, TUBE_PRESSURES, held.radius)
@@ -92,7 +96,7 @@ def tube(folder, size=0.25):
     ]
 
 
-def capped_tube(folder, size=0.25):
+def capped_tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
     """Inner radii and stretches of the tube whose axial force is the thrust P pi a^2 on its far caps."""
     held = _Tube(folder, size)
     system, rows = held.system, []
@@ -118,7 +122,9 @@ def capped_tube(folder, size=0.25):
     return rows
 
 
-def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
+def torsion(
+    folder: Path, size: float = 0.3, stretch: float = 1.2, twist: float = 0.5
+) -> tuple[list[ExactComparison], float]:
     """(torque and axial force of a stretched and twisted cylinder, largest error of its displacements in
     mm)."""
 
@@ -146,7 +152,9 @@ def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
     return rows, float(np.abs(u - motion(X, 1.0)).max())
 
 
-def flexure(cells=(4, 16), length=0.3, thickness=0.07):
+def flexure(
+    cells: tuple[int, int] = (4, 16), length: float = 0.3, thickness: float = 0.07
+) -> list[ExactComparison]:
     """Moments of a block of height 1 bent in plane strain: rollers in the middle, an end section that turns
     as it should.
 
@@ -197,7 +205,7 @@ STRIP_LOADS = {
 }
 
 
-def cantilever(name, cells=(60, 2, 2)):
+def cantilever(name: str, cells: tuple[int, int, int] = (60, 2, 2)) -> tuple[np.ndarray, np.ndarray]:
     """(tip (x, z) of a strip under one of STRIP_LOADS, that of the elastica with E = 3 mu and I = w
     h^3/12)."""
     length, width, height = STRIP
