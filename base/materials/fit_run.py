@@ -14,6 +14,7 @@ from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
 from pneunet.base.materials.laws import LAWS, Hyperelastic, material_to_table
 from pneunet.base.materials.tensile import Specimen, read_tensile
+from pneunet.base.units import KPA_PER_MPA
 
 log = logging.getLogger(__name__)
 
@@ -146,7 +147,7 @@ def draw(
         for s in specimens:
             use = s.stretch <= tests.largest
             off = nominal_stress(f.material, "uniaxial", s.stretch[use]) - s.stress[use]
-            residual.plot(s.stretch[use], 1e3 * off, **style(f))
+            residual.plot(s.stretch[use], KPA_PER_MPA * off, **style(f))
     residual.axhline(0, color="0.3", linewidth=0.6)
     l = np.linspace(1.0, min(tests.largest, 3.0), 200)
     for f in credible:

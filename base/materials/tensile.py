@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.units import MPA_PER_KPA
 
-STRESS_UNITS = {"mpa": 1.0, "n/mm2": 1.0, "n/mm^2": 1.0, "kpa": 1e-3, "pa": 1e-6, "psi": 0.006894757}
+STRESS_UNITS = {"mpa": 1.0, "n/mm2": 1.0, "n/mm^2": 1.0, "kpa": MPA_PER_KPA, "pa": 1e-6, "psi": 0.006894757}
 #: more strain than this, without a unit, is taken for percent by no one but the user
 LARGEST_STRAIN = 25.0
 

@@ -1,6 +1,8 @@
 """A whole manipulator, clamped at its base, under dead loads and one cavity pressure."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -8,10 +10,12 @@ from mpi4py import MPI
 from pneunet.base import se3
 from pneunet.geometry import tags
 from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.body.problem import BodyProblem, Support
 from pneunet.hifi.body.system import BodySystem
 from pneunet.hifi.contact.body import BodyContact
 from pneunet.hifi.contact.body_distance import BodyDistance
+from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.contact.touch import Load, Touch, TouchWatch
 from pneunet.hifi.contact.walls import WallDistances
 from pneunet.hifi.fem import compat
@@ -20,8 +24,9 @@ from pneunet.hifi.fem.sections import SectionFrames
 from pneunet.hifi.fem.stretch import PrincipalStretch
 from pneunet.hifi.path.control import ArcLength, LoadControl, VolumeControl
 from pneunet.hifi.path.equilibrium import EquilibriumPath
+from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.rod_coordinates import RodCoordinates
-from pneunet.hifi.path.stepping import StepResult, StepSize, run_steps
+from pneunet.hifi.path.stepping import Step, StepResult, StepSize, run_steps
 
 #: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how
 #: far they strain
@@ -63,14 +68,14 @@ class ManipulatorSolve:
 
     def __init__(
         self,
-        manipulator,
-        mesh_path,
-        comm=MPI.COMM_WORLD,
-        newton_options=None,
-        flip_y=False,
-        loads=None,
-        hold_tip=False,
-        contact=None,
+        manipulator: Manipulator,
+        mesh_path: Path,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        newton_options: NewtonOptions | None = None,
+        flip_y: bool = False,
+        loads: DeadLoads | None = None,
+        hold_tip: bool = False,
+        contact: WallPenalty | None = None,
     ):
         """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh.
         loads: geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at
@@ -116,7 +121,7 @@ class ManipulatorSolve:
         for load in self.dead:
             load.value.value = fraction
 
-    def begin(self, stage):
+    def begin(self, stage: str) -> None:
         """From the present state on, walk along `stage`: DEAD_LOADS from none to all, or inflate under the
         control so called."""
         if stage == DEAD_LOADS:
@@ -133,7 +138,7 @@ class ManipulatorSolve:
         if before:
             self.path.newton.timings = before.newton.timings
 
-    def measure(self, step=None, stability_factorisations=0):
+    def measure(self, step: Step | None = None, stability_factorisations: int = 0) -> Measured:
         """Measured of the current state; collective."""
         frames, walls = self.sections.frames(), self.walls.distances()
         return Measured(
@@ -169,14 +174,14 @@ class ManipulatorSolve:
 
     def run(
         self,
-        target,
-        on_measured=lambda measured: None,
-        milestones=(),
-        first_step=None,
-        before=None,
-        control="pressure",
-        stability=True,
-    ):
+        target: float,
+        on_measured: Callable[[Measured], None] = lambda measured: None,
+        milestones: Sequence[float] = (),
+        first_step: float | None = None,
+        before: Step | None = None,
+        control: str = "pressure",
+        stability: bool = True,
+    ) -> StepResult:
         """The dead loads, if there are any, in a ramp of their own; then inflate to `target`; a StepResult of
         the latter.
 
@@ -244,7 +249,7 @@ class ManipulatorSolve:
         turn = np.linalg.norm(se3.log_rotation(np.swapaxes(relative[0], -1, -2) @ relative[1]), axis=-1).sum()
         return max(turn, 1e-12) / (second.parameter - first.parameter)
 
-    def destroy(self):
+    def destroy(self) -> None:
         self.system.destroy()
 
 

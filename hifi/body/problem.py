@@ -14,10 +14,10 @@ from petsc4py import PETSc
 
 from pneunet.hifi.contact.gaps import Contact
 from pneunet.hifi.fem import compat
-from pneunet.hifi.fem.loads import Load, Pressure
+from pneunet.hifi.fem.loads import AppliedLoad, Pressure
 from pneunet.hifi.fem.materials import Materials, energy_density, groups
 from pneunet.hifi.fem.mixed_field import MixedField
-from pneunet.hifi.fem.potential import Potential, Term
+from pneunet.hifi.fem.potential import PotentialEnergy, Term
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class BodyProblem(MixedField):
         facet_tags: compat.MeshTags,
         materials: Materials,
         supports: list[Support],
-        loads: Sequence[Load] = (),
+        loads: Sequence[AppliedLoad] = (),
     ):
         super().__init__(mesh, cell_tags, facet_tags)
         self.supports = list(supports)
@@ -63,7 +63,7 @@ class BodyProblem(MixedField):
         self.contact = Contact(mesh.comm, self.dofs, self.owned_range)
         self.symmetric = all(load.closed for load in self.loads)
         self.deformation_gradient = F = ufl.Identity(3) + ufl.grad(self.u)
-        self._potential = Potential(
+        self._potential = PotentialEnergy(
             self,
             [
                 Term(energy_density(mesh, material, F, self.p), self.cells(*tags))
@@ -88,7 +88,7 @@ class BodyProblem(MixedField):
         value = fem.Function(collapsed)
         return fem.dirichletbc(value, dofs, where)
 
-    def supported(self, array, load):
+    def supported(self, array: np.ndarray, load: float) -> np.ndarray:
         """`array` with the supported displacements set to their values at this load."""
         for support, bc in zip(self.supports, self.bcs):
             dofs = bc.dof_indices()[0]
@@ -113,7 +113,7 @@ class BodyProblem(MixedField):
             load.update(self)
         return self.vector(self._external)
 
-    def residual(self):
+    def residual(self) -> tuple[np.ndarray, float]:
         """((owned dofs,) residual in N and mm3, norm of what it balances in N) at the current state and load
         values.
 
@@ -128,12 +128,12 @@ class BodyProblem(MixedField):
         r[self._fixed_owned] = 0.0
         return r, np.sqrt(scale)
 
-    def unsupported(self, vector):
+    def unsupported(self, vector: np.ndarray) -> np.ndarray:
         """`vector` (owned dofs,) with zeros at the supports."""
         vector[self._fixed_owned] = 0.0
         return vector
 
-    def reaction(self, tag, point=(0.0, 0.0, 0.0)):
+    def reaction(self, tag: int, point: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
         """(force (3,) in N, moment (3,) in N mm about `point`) with which the tagged support holds the
         body."""
         r = self.vector(self._potential.residuals) + self.external_force()

@@ -1,11 +1,15 @@
 """A BodyProblem as a system for Newton's method: section-frame updates and a tangent that turns with the
 body."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from mpi4py import MPI
 
+from pneunet.hifi.body.problem import BodyProblem
 from pneunet.hifi.fem.solver import DirectSolver
 from pneunet.hifi.path.low_rank import ContactUpdate
+from pneunet.hifi.path.rod_coordinates import RodCoordinates
 
 #: changes of touch above which a tangent is factorised anew
 MOST_TOUCHES = 60
@@ -15,7 +19,9 @@ class BodySystem:
     """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each
     linear in it."""
 
-    def __init__(self, problem, coordinates, apply_load):
+    def __init__(
+        self, problem: BodyProblem, coordinates: RodCoordinates, apply_load: Callable[[float], None]
+    ):
         self.problem, self.coordinates, self.apply_load = problem, coordinates, apply_load
         self.comm = problem.mesh.comm
         self._matrix = problem.create_tangent()
@@ -28,36 +34,36 @@ class BodySystem:
 
     # ---- state and load
     @property
-    def state(self):
+    def state(self) -> np.ndarray:
         return self.problem.array
 
     @state.setter
-    def state(self, array):
+    def state(self, array: np.ndarray) -> None:
         self.problem.set_array(array)
 
     @property
-    def load(self):
+    def load(self) -> float:
         return self._load
 
     @load.setter
-    def load(self, value):
+    def load(self, value: float) -> None:
         self._load = value
         self.apply_load(value)
 
-    def steer(self, apply_load, load):
+    def steer(self, apply_load: Callable[[float], None], load: float) -> None:
         """From here on the load is what `apply_load` sets, and begins at `load`; what was set before
         stays."""
         self.apply_load, self.load = apply_load, load
 
-    def at_supports(self, state):
+    def at_supports(self, state: np.ndarray) -> np.ndarray:
         """`state` with supported displacements at their values for the present load."""
         return self.problem.supported(state, self._load)
 
     # ---- residual and tangent
-    def residual(self):
+    def residual(self) -> tuple[np.ndarray, float]:
         return self.problem.residual()
 
-    def load_gradient(self):
+    def load_gradient(self) -> np.ndarray:
         """(owned dofs,) derivative of the residual by the load, which it is linear in; zero at supports."""
         load, ends = self._load, []
         for value in (0.0, 1.0):
@@ -66,7 +72,7 @@ class BodySystem:
         self.apply_load(load)
         return self.problem.unsupported(ends[1] - ends[0])
 
-    def factorise(self):
+    def factorise(self) -> None:
         self.problem.assemble_tangent(self._matrix)
         self.solver.factorise()
         self._rotation_then = self._rotations()
@@ -74,10 +80,10 @@ class BodySystem:
         self._update = ContactUpdate(touching, MOST_TOUCHES, self.comm.allreduce)
 
     @property
-    def overreach(self):
+    def overreach(self) -> float:
         return self.problem.contact.overreach
 
-    def renew(self):
+    def renew(self) -> bool | None:
         """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
         contact = self.problem.contact
         return self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns)
@@ -88,7 +94,7 @@ class BodySystem:
     def _rotations(self):
         return self.coordinates.sections(self.coordinates.nodes + self.problem.displacement())[:, :3, :3]
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """(owned dofs,) approximation of K^-1 right at the current state, K as it was renewed."""
         return self._update.corrected(self._solve(right))
 
@@ -107,7 +113,7 @@ class BodySystem:
         return solution
 
     @property
-    def unstable(self):
+    def unstable(self) -> int | None:
         """Directions in which the factorised state is unstable at fixed loads; None when the matrix is
         unsymmetric."""
         if not self.factorisations:
@@ -116,11 +122,11 @@ class BodySystem:
         return None if negative is None else negative - self.problem.constraints
 
     @property
-    def factorisations(self):
+    def factorisations(self) -> int:
         return self.solver.factorisations
 
     # ---- geometry of the state space
-    def moved(self, state, increment):
+    def moved(self, state: np.ndarray, increment: np.ndarray) -> np.ndarray:
         """State after an increment (owned dofs,): displacement retracted, pressure added, supported values
         kept."""
         self._spread.x.array[: len(increment)] = increment
@@ -133,36 +139,36 @@ class BodySystem:
         moved[fixed] = state[fixed]
         return moved
 
-    def extrapolated(self, states, weights):
+    def extrapolated(self, states: Sequence[np.ndarray], weights: Sequence[float]) -> np.ndarray:
         """Lagrange extrapolation of states in section frames."""
         predicted = sum(w * a for w, a in zip(weights, states))
         dofs, X = self.problem.displacement_dofs, self.coordinates.nodes
         predicted[dofs] = self.coordinates.extrapolate([X + a[dofs] for a in states], weights) - X
         return predicted
 
-    def dot(self, a, b):
+    def dot(self, a: np.ndarray, b: np.ndarray) -> float:
         return self.comm.allreduce(float(a @ b), op=MPI.SUM)
 
-    def volume(self):
+    def volume(self) -> float:
         return self.problem.cavity_volume()
 
     # ---- the metric of arc length: root mean square displacement of the nodes
-    def positions(self):
+    def positions(self) -> np.ndarray:
         return self.problem.array[self._owned_displacements].ravel()
 
-    def positions_part(self, increment):
+    def positions_part(self, increment: np.ndarray) -> np.ndarray:
         return increment[self._owned_displacements].ravel()
 
-    def mean_square(self, a, b):
+    def mean_square(self, a: np.ndarray, b: np.ndarray) -> float:
         return self.dot(a, b) / self._nodes
 
-    def mean_square_row(self, a):
+    def mean_square_row(self, a: np.ndarray) -> np.ndarray:
         """(owned dofs,) gradient of mean_square(a, positions)."""
         row = np.zeros(self.problem.owned)
         row[self._owned_displacements.ravel()] = a / self._nodes
         return self.problem.unsupported(row)
 
-    def destroy(self):
+    def destroy(self) -> None:
         self.solver.destroy()
         self._matrix.destroy()
         self.problem.destroy()

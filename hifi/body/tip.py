@@ -1,18 +1,26 @@
 """How the tip of an inflated manipulator yields, and how hard it pushes: passive tip stiffness and blocked
 force."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
 from pneunet.base.errors import ConvergenceError
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry import tags
 from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.body.system import BodySystem
+from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.surface import FaceQuadrature
 
 
-def compliance(system, tag, frame):
+def compliance(system: BodySystem, tag: int, frame: np.ndarray) -> np.ndarray:
     """(6, 6) compliance of a tagged face at fixed loads, from the tangent at the present state, which it
     factorises.
 
@@ -41,13 +49,13 @@ def compliance(system, tag, frame):
     return np.array([[system.dot(right, answer) for answer in answers] for right in rights])
 
 
-def stiffness(solve):
+def stiffness(solve: ManipulatorSolve) -> dict[str, Any]:
     """run.json's `tip_stiffness`: the inverse of the tip's compliance in its section frame, of a
     ManipulatorSolve; collective."""
     frame = solve.sections.frames()[-1]
     K = np.linalg.inv(compliance(solve.system, tags.TIP, frame))
     return {
-        "pressure_kPa": float(solve.pressure.value.value) * 1e3,
+        "pressure_kPa": float(solve.pressure.value.value) * KPA_PER_MPA,
         **solve.measure().touch.marks,
         "rows": (
             "force_N, moment_N_mm; columns: displacement_mm, rotation_rad; in axes and about origin of the"
@@ -59,7 +67,14 @@ def stiffness(solve):
     }
 
 
-def blocked_force(manipulator, mesh_path, pressure, loads, comm, contact=None):
+def blocked_force(
+    manipulator: Manipulator,
+    mesh_path: Path,
+    pressure: float,
+    loads: DeadLoads,
+    comm: MPI.Comm,
+    contact: WallPenalty | None = None,
+) -> dict[str, Any]:
     """run.json's `blocked_force`: what the tip, held where it is at rest, pushes with at `pressure` (MPa);
     collective.
 
@@ -80,7 +95,7 @@ def blocked_force(manipulator, mesh_path, pressure, loads, comm, contact=None):
     measured = held.measure()
     held.destroy()
     return {
-        "pressure_kPa": measured.pressure * 1e3,
+        "pressure_kPa": measured.pressure * KPA_PER_MPA,
         "reached": reached,
         **measured.touch.marks,
         "force_N": (-force).tolist(),

@@ -33,7 +33,7 @@ from pneunet.hifi.fem import compat, surface
 from pneunet.hifi.fem.compat import compile_form
 from pneunet.hifi.fem.materials import energy_density
 from pneunet.hifi.fem.mixed_field import MixedField
-from pneunet.hifi.fem.potential import Potential, Term
+from pneunet.hifi.fem.potential import PotentialEnergy, Term
 from pneunet.hifi.fem.stretch import PrincipalStretch
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
@@ -90,18 +90,18 @@ class CellProblem(MixedField):
         )
         self._bordered = None
 
-    def move(self, segment, vertices):
+    def move(self, segment: Segment, vertices: np.ndarray) -> None:
         """Make this the cell of another segment, on the same mesh with its vertices (n, 3) elsewhere."""
         self.segment, self.mesh.geometry.x[:] = segment, vertices
         self._place()
 
     @property
-    def placement(self):
+    def placement(self) -> tuple[np.ndarray, dict]:
         """All that `move` changes; assigned, it brings the cell back."""
         return self.mesh.geometry.x.copy(), {name: getattr(self, name) for name in _PLACED}
 
     @placement.setter
-    def placement(self, kept):
+    def placement(self, kept: tuple[np.ndarray, dict]) -> None:
         self.mesh.geometry.x[:], placed = kept
         vars(self).update(placed)
 
@@ -131,7 +131,7 @@ class CellProblem(MixedField):
                 ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c)
             )
             terms.append(Term(self.medium.density(F, second, mu), self.cells(tags.GAP)))
-        self._potential = Potential(self, terms)
+        self._potential = PotentialEnergy(self, terms)
         t = ufl.TestFunction(compat.cell_vectors(self.mesh, 6))
         slopes = [(ufl.diff(term.density, q), term.measure) for term in terms]
         along = [(ufl.inner(slope, self._direction), d) for slope, d in slopes]
@@ -204,7 +204,7 @@ class CellProblem(MixedField):
                 ).tocsr()
         self.gauge = gauge
 
-    def expand(self, values):
+    def expand(self, values: np.ndarray) -> np.ndarray:
         """State array of the mixed space from the unknowns (unknowns,)."""
         return np.where(self.reduced >= 0, values[self.reduced], 0.0)
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from pneunet.geometry.cad.morph import moved
 from pneunet.geometry.shape_numbers import DIRECTIONS, changed
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.system import CellSystem
 
 #: normal pitches or, for the angle, degrees
 STEP, ANGLE_STEP = 1e-4, 1e-2
@@ -21,7 +23,7 @@ STEP, ANGLE_STEP = 1e-4, 1e-2
 class ShapeSlopes:
     """For a hifi.cell.problem.CellProblem, which must be where its segment is."""
 
-    def __init__(self, problem):
+    def __init__(self, problem: CellProblem):
         self.problem, home, vertices = problem, problem.segment, problem.mesh.geometry.x.copy()
         kept = problem.placement
         self._moved, self.steps = [], []
@@ -32,7 +34,7 @@ class ShapeSlopes:
             self._moved.append(problem.placement)
         problem.placement = kept
 
-    def of(self, system, stiffness=True):
+    def of(self, system: CellSystem, stiffness: bool = True) -> tuple[np.ndarray, np.ndarray | None]:
         """(slopes of the strains (d, 6), of CellState.stiffness (d, 6, 6) or None) by the d directions at a
         free state of `system`, a CellSystem that has just been factorised there. mm, N, and normal pitches or
         degrees."""

@@ -1,5 +1,6 @@
 """The unit cell as a system for Newton's method, and what an equilibrium of it says about the rod."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -7,6 +8,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pneunet.base.strains import RodStrains
+from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.fem.solver import DirectSolver
 from pneunet.hifi.path.low_rank import ContactUpdate
 
@@ -47,7 +49,7 @@ class CellState:
     seconds: float = 0.0
 
     @property
-    def screw_compliance(self):
+    def screw_compliance(self) -> np.ndarray:
         """(2, 2) of 1/N and 1/(N mm2): how k.k/2 and k.e of a free state change under the wrench m = a k + b
         e, n = b k.
 
@@ -60,11 +62,11 @@ class CellState:
         return wrenches @ np.linalg.solve(self.stiffness, wrenches.T)
 
     @property
-    def walls_overlap(self):
+    def walls_overlap(self) -> bool:
         return self.wall_distance < (0.0 if self.contact is None else -TOO_DEEP * self.gap)
 
     @property
-    def kirchhoff_stiffness(self):
+    def kirchhoff_stiffness(self) -> np.ndarray:
         """(4, 4) stiffness in (e1, k1, k2, k3) when the shears e2 and e3 relax."""
         kept, relaxed = [0, 3, 4, 5], [1, 2]
         K = self.stiffness
@@ -83,7 +85,13 @@ class CellSystem:
     their entries forces and lengths.
     """
 
-    def __init__(self, problem, held=None, pressure=(0.0, 1.0), strains=None):
+    def __init__(
+        self,
+        problem: CellProblem,
+        held: np.ndarray | None = None,
+        pressure: tuple[float, float] = (0.0, 1.0),
+        strains: tuple[np.ndarray, np.ndarray] | None = None,
+    ):
         self.problem, self.pitch = problem, problem.segment.pitch
         self.held = np.zeros(6, bool) if held is None else np.asarray(held, bool)
         self._free = np.flatnonzero(~self.held)
@@ -101,26 +109,26 @@ class CellSystem:
 
     # ---- state and load
     @property
-    def state(self):
+    def state(self) -> np.ndarray:
         return self._x
 
     @state.setter
-    def state(self, x):
+    def state(self, x: np.ndarray) -> None:
         self._x = x
         n = self.problem.unknowns
         self.problem.array[:] = self.problem.expand(x[:n])
         self.problem.strains.value[:] = x[n + 6 :]
 
     @property
-    def load(self):
+    def load(self) -> float:
         return self._load
 
     @load.setter
-    def load(self, value):
+    def load(self, value: float) -> None:
         self._load = value
         self.problem.pressure.value = self._pressure[0] + value * self._pressure[1]
 
-    def at_supports(self, state):
+    def at_supports(self, state: np.ndarray) -> np.ndarray:
         """`state` with the held strains at their values for the present load."""
         state = state.copy()
         state[-6:][self.held] = (self._strains[0] + self._load * self._strains[1])[self.held]
@@ -136,13 +144,13 @@ class CellSystem:
         r = np.concatenate([forces + gauge @ multipliers, gauge.T @ self._x[:n] + gauge_strains @ strains])
         return r, slope + gauge_strains.T @ multipliers
 
-    def residual(self):
+    def residual(self) -> tuple[np.ndarray, float]:
         r, slope = self._parts()
         return np.concatenate(
             [r, slope[self._free] / self.pitch]
         ), self.problem.segment.material.mu * self.pitch**2
 
-    def load_gradient(self):
+    def load_gradient(self) -> np.ndarray:
         """Derivative of the residual by the load; through held strains with the factorised tangent's
         coupling."""
         kept, ends = self.problem.pressure.value.copy(), []
@@ -158,7 +166,7 @@ class CellSystem:
             )
         return gradient
 
-    def factorise(self):
+    def factorise(self) -> None:
         """Factorise the tangent. influence (unknowns + 6, 6): how unknowns and multipliers resist strains,
         K^-1 d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
         on."""
@@ -181,7 +189,7 @@ class CellSystem:
         self.condensed = self._curvature - self._mixed.T @ self.influence
         self._update = ContactUpdate(self.problem.contact.stiffnesses(factorised=True))
 
-    def renew(self):
+    def renew(self) -> bool | None:
         """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
         return self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve)
 
@@ -189,12 +197,12 @@ class CellSystem:
         rows, n = self.problem.contact.gradients(points), self.problem.unknowns
         return np.hstack([rows[:, :n], np.zeros((len(rows), 6)), rows[:, n:][:, self._free] / self.pitch])
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was
         renewed."""
         return self._update.corrected(self._solve(right[:, None])[:, 0])
 
-    def solve_inner(self, right):
+    def solve_inner(self, right: np.ndarray) -> np.ndarray:
         """Inverse of the factorised tangent at held strains times right (unknowns + 6, columns)."""
         return self._solver.solve_many(right)
 
@@ -209,7 +217,7 @@ class CellSystem:
         return np.vstack([z - self.influence[:, free] @ q, q * self.pitch])
 
     @property
-    def unstable(self):
+    def unstable(self) -> int:
         """Unstable directions of the factorised state: each multiplier takes one negative pivot, strains
         count apart."""
         free = self.condensed[np.ix_(self._free, self._free)]
@@ -217,32 +225,32 @@ class CellSystem:
         return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))
 
     @property
-    def overreach(self):
+    def overreach(self) -> float:
         return self.problem.contact.overreach
 
     @property
-    def factorisations(self):
+    def factorisations(self) -> int:
         return self._factorisations
 
-    def moved(self, state, increment):
+    def moved(self, state: np.ndarray, increment: np.ndarray) -> np.ndarray:
         moved = state.copy()
         n = len(state) - 6
         moved[:n] += increment[:n]
         moved[n + self._free] += increment[n:] / self.pitch
         return moved
 
-    def extrapolated(self, states, weights):
+    def extrapolated(self, states: Sequence[np.ndarray], weights: Sequence[float]) -> np.ndarray:
         return sum(w * x for w, x in zip(weights, states))
 
-    def dot(self, a, b):
+    def dot(self, a: np.ndarray, b: np.ndarray) -> float:
         return float(a @ b)
 
-    def volume(self):
+    def volume(self) -> float:
         """Volume (mm3) of the air in one pitch."""
         return self.problem.air_volume()
 
     # ---- what the rod needs
-    def measure(self):
+    def measure(self) -> CellState:
         """CellState of the present equilibrium; factorises its tangent."""
         self.factorise()
         _, slope = self._parts()
@@ -267,5 +275,5 @@ class CellSystem:
             self._solver.destroy()
             self._matrix.destroy()
 
-    def destroy(self):
+    def destroy(self) -> None:
         self._release()

@@ -16,8 +16,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pneunet.geometry import tags
+from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.contact.walls import distances_from
 from pneunet.hifi.fem import surface
+from pneunet.hifi.fem.mixed_field import MixedField
 
 #: slabs in the length that counts as far apart
 _SLABS = 8
@@ -36,7 +38,7 @@ class BodyDistance:
     apart: mm along the undeformed axis from which on two points count as far apart (a quarter more at most).
     """
 
-    def __init__(self, problem, manipulator):
+    def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
         heights = [s.chamber_top - min(s.core_bottom, s.chamber_bottom) for s in manipulator.segments]
         self.diameter = max(float(np.hypot(s.width, h)) for s, h in zip(manipulator.segments, heights))
@@ -64,7 +66,7 @@ class BodyDistance:
         self._facet_low, self._facet_high = x[self._facets].min(axis=1), x[self._facets].max(axis=1)
         self._pairs = np.argwhere(self._low[None, :] - self._high[:, None] >= self.apart - _ROUNDING)
 
-    def smallest(self, array=None):
+    def smallest(self, array: np.ndarray | None = None) -> float | None:
         """Signed distance in mm, on rank 0 (None elsewhere); inf for a body too short to have far parts."""
         positions = self._gather(self.problem.nodes + self.problem.displacement(array))
         return None if self.comm.rank else self._smallest(positions.reshape(-1, 3)[self._first])
@@ -136,7 +138,7 @@ class BodyDistance:
         return clear.min()
 
 
-def winding_numbers(points, triangles):
+def winding_numbers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(n,) of points (n, 3) by oriented triangles (m, 3, 3): 1 inside a closed surface, 0 outside, between
     them near a hole.
 

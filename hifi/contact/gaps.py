@@ -11,9 +11,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from pneunet.hifi.contact.penalty import DEEPEST, PenaltyLaw, Touching
-
-#: what tells a point of a wall from all others: side, facet and Gauss point
-Point = tuple[int, int, int]
+from pneunet.hifi.path.low_rank import Stiffnesses
 
 
 class Side:
@@ -36,7 +34,7 @@ class Side:
         return (-1) ** self.number * (t.area * t.pressure) @ t.normal
 
     @property
-    def stiffnesses(self) -> dict[Point, float]:
+    def stiffnesses(self) -> Stiffnesses:
         """{point: N/mm}, in the order of the points."""
         t = self.touching
         return {(self.number, *name): k for name, k in zip(t.name.tolist(), t.area * t.slope)}
@@ -119,13 +117,13 @@ class Contact:
         self._then = self.sides()
         return self._sum([side.tangent() for side in self._then], self._size)
 
-    def stiffnesses(self, factorised: bool = False) -> dict[Point, float]:
+    def stiffnesses(self, factorised: bool = False) -> Stiffnesses:
         """{point: N/mm} of all ranks, at the last residual or at the last tangent."""
         sides = self._then if factorised else self._now
         parts = self.comm.allgather([side.stiffnesses for side in sides])
         return {point: value for part in parts for side in part for point, value in side.items()}
 
-    def gradients(self, points: list[Point]) -> np.ndarray:
+    def gradients(self, points: list) -> np.ndarray:
         """(m, owned): how the gaps of points change; zero for those that push at no side."""
         places, rows = {p: i for i, p in enumerate(points)}, {}
         for side in [*self._now, *self._then]:  # what is taken away was put in as it was then

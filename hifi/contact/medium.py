@@ -17,12 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from petsc4py import PETSc
+from ufl.core.expr import Expr
 
 from pneunet.base.errors import ConvergenceError
 from pneunet.hifi.path.control import LoadControl
 from pneunet.hifi.path.equilibrium import EquilibriumPath
+from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
+from pneunet.hifi.path.system import System
 
 #: smooth positive part of J: (J + sqrt(J^2 + s^2))/2
 _SMOOTH = 0.01
@@ -40,11 +44,11 @@ class ThirdMedium:
     regularisation: tuple = (5e-3, 1e-3)
     smallest_volume: tuple = (0.01, 0.01)
 
-    def on(self, mesh):
+    def on(self, mesh: Mesh) -> "MediumEnergy":
         """The medium's MediumEnergy on a mesh."""
         return MediumEnergy(self, mesh)
 
-    def softer(self, start, end):
+    def softer(self, start: float, end: float) -> "ThirdMedium":
         """The medium that goes from `start` times the recorded one to `end` times it; squeezed it is thinner
         likewise, by J0."""
         return ThirdMedium(
@@ -59,31 +63,31 @@ class MediumEnergy:
     """The energy with its parameters as constants that `softening` sets: 0 the followed, 1 the recorded
     medium."""
 
-    def __init__(self, medium, mesh):
+    def __init__(self, medium: ThirdMedium, mesh: Mesh):
         self._constants = [fem.Constant(mesh, PETSc.ScalarType(1.0)) for _ in range(3)]
         self.between(medium)
 
-    def between(self, medium):
+    def between(self, medium: ThirdMedium) -> None:
         """Go from the `medium`'s followed to its recorded parameters, and stand at the former."""
         self._ends = np.log([medium.gamma, medium.regularisation, medium.smallest_volume])
         self.softening = 0.0
 
     @property
-    def softening(self):
+    def softening(self) -> float:
         return self._softening
 
     @softening.setter
-    def softening(self, value):
+    def softening(self, value: float) -> None:
         self._softening = value
         for constant, (followed, recorded) in zip(self._constants, self._ends):
             constant.value = np.exp((1 - value) * followed + value * recorded)
 
     @property
-    def gamma(self):
+    def gamma(self) -> float:
         """Shear modulus of the medium now, over the body's."""
         return float(self._constants[0].value)
 
-    def density(self, F, second, mu):
+    def density(self, F: Expr, second: Expr, mu: Expr) -> Expr:
         """UFL energy density (MPa); second: the third-order tensor grad F (1/mm)."""
         gamma, kr, J0 = self._constants
         J = ufl.det(F)
@@ -97,29 +101,29 @@ class MediumEnergy:
 class Softening:
     """`system` (hifi.path.newton) with the medium's softening as its load; the system's own load stays."""
 
-    def __init__(self, system, energy):
+    def __init__(self, system: System, energy: MediumEnergy):
         self._system, self._energy = system, energy
 
     def __getattr__(self, name):
         return getattr(self._system, name)
 
     @property
-    def state(self):
+    def state(self) -> np.ndarray:
         return self._system.state
 
     @state.setter
-    def state(self, value):
+    def state(self, value: np.ndarray) -> None:
         self._system.state = value
 
     @property
-    def load(self):
+    def load(self) -> float:
         return self._energy.softening
 
     @load.setter
-    def load(self, value):
+    def load(self, value: float) -> None:
         self._energy.softening = value
 
-    def load_gradient(self):
+    def load_gradient(self) -> np.ndarray:
         """By a difference: the medium's part of the residual is all but exponential in the softening."""
         kept, step, ends = self.load, 1e-5, []
         for value in (kept - step, kept + step):
@@ -129,7 +133,7 @@ class Softening:
         return (ends[1] - ends[0]) / (2 * step)
 
 
-def soften(system, energy, options):
+def soften(system: System, energy: MediumEnergy, options: NewtonOptions) -> float:
     """Walk from the followed medium's equilibrium towards the recorded one's; gamma of the last equilibrium
     on the way."""
     path = EquilibriumPath(Softening(system, energy), LoadControl(), options)

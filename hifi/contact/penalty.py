@@ -44,7 +44,7 @@ class WallPenalty:
     stiffness: float = 40.0
     onset: float = 5e-3
 
-    def on(self, mu, gap):
+    def on(self, mu: float, gap: float) -> "PenaltyLaw":
         """The law of a gap (mm) in a body of shear modulus mu (MPa)."""
         return PenaltyLaw(self.stiffness * mu / gap, self.onset * gap, gap)
 
@@ -58,7 +58,7 @@ class PenaltyLaw:
     onset: float
     gap: float
 
-    def __call__(self, overlap):
+    def __call__(self, overlap: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(energy per area, pressure, its slope) of overlaps (n,) in mm; N/mm, MPa and MPa/mm."""
         k, s = self.stiffness, self.onset
         rising, full = np.clip(overlap + s, 0.0, 2 * s), np.maximum(overlap - s, 0.0)
@@ -93,23 +93,30 @@ class Touching:
     name: np.ndarray
 
     @property
-    def push(self):
+    def push(self) -> np.ndarray:
         """(c,) N: minus the derivative of the energy by the gap, for each pair."""
         return (self.area * self.pressure)[self.point]
 
     @property
-    def forces(self):
+    def forces(self) -> np.ndarray:
         """(c, 12, 3) N: how the energy changes with the nodes."""
         return -self.push[:, None, None] * self.gradient
 
 
-def mean_normal(facets):
+def mean_normal(facets: np.ndarray) -> np.ndarray:
     """(3,) area (mm2) of facets (n, 6, 3) as a vector; edges taken straight."""
     a, b, c = (facets[:, i] for i in range(3))
     return np.cross(b - a, c - a).sum(axis=0) / 2
 
 
-def touching(points, areas, wall, direction, law, share=0.5):
+def touching(
+    points: np.ndarray,
+    areas: np.ndarray,
+    wall: np.ndarray,
+    direction: np.ndarray,
+    law: PenaltyLaw,
+    share: float = 0.5,
+) -> Touching | None:
     """The Touching of the Gauss points of facets `points` (n, 6, 3) in mm, undeformed areas (n,) in mm2, on
     the `wall` (m, 6, 3) that lies in `direction` (3,); None where nothing comes closer than the law's onset.
     share: of the contact that this side carries."""

@@ -1,5 +1,8 @@
 """Picture of a deformed cell, repeated by its screw: where do neighbouring chambers touch?"""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from pneunet.base import se3
@@ -12,7 +15,7 @@ PITCHES = 3
 DIVISIONS = 3
 
 
-def draw_cell(problem, state, path, pitches=PITCHES):
+def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> bool:
     """Write the picture of a hifi.cell.system.CellState of a hifi.cell.problem.CellProblem to `path` (PNG);
     False without gaps.
 
@@ -56,7 +59,7 @@ def draw_cell(problem, state, path, pitches=PITCHES):
     return True
 
 
-def node_distances(walls, array):
+def node_distances(walls: CellWalls, array: np.ndarray) -> np.ndarray:
     """(nodes,) signed distances (mm) from the wall opposite, of the displacement nodes on the walls of a
     CellWalls; nan elsewhere."""
     out = np.full(len(walls.problem.nodes), np.nan)

@@ -7,7 +7,9 @@ keeps apart, and *the body* itself: coils or segments that are far apart along i
 out of an overlap is not trusted again when the distance grows.
 """
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,25 +49,25 @@ class Touch:
     contact_force: float = 0.0
 
     @property
-    def walls_overlap(self):
+    def walls_overlap(self) -> bool:
         return self.walls_from is not None and not self.contact
 
     @property
-    def body_overlap(self):
+    def body_overlap(self) -> bool:
         return self.body_from is not None
 
     @property
-    def marks(self):
+    def marks(self) -> dict[str, bool]:
         """{column of MARKS: bool}."""
         return {name: getattr(self, name) for name in MARKS}
 
     @property
-    def warnings(self):
+    def warnings(self) -> list[str]:
         """Short words on what makes the state doubtful."""
         return [name.replace("_", " ") for name, holds in self.marks.items() if holds]
 
     @property
-    def text(self):
+    def text(self) -> str:
         """What the last line of a run says, "" where nothing overlaps."""
         told = [f"WALLS OVERLAP from {self.walls_from} on, without contact"] * self.walls_overlap
         told += [
@@ -73,7 +75,7 @@ class Touch:
         ] * self.body_overlap
         return "; ".join(told)
 
-    def news(self, before):
+    def news(self, before: "Touch") -> Iterator[str]:
         """Sentences on what this state has met and the one `before` it had not."""
         if self.walls_from and not before.walls_from:
             then = (
@@ -88,7 +90,7 @@ class Touch:
                 " modelled, states from here on are marked 'body overlap'"
             )
 
-    def table(self):
+    def table(self) -> dict[str, Any]:
         """run.json's part: pressures in kPa, null where nothing has touched."""
         return {
             "contact": self.contact,
@@ -100,7 +102,7 @@ class Touch:
         }
 
 
-def marked(row):
+def marked(row: Mapping[str, str]) -> bool:
     """Whether a row of a table, {column: text}, is marked as one in which parts of the body overlap."""
     return any(row.get(mark) == "1" for mark in MARKS)
 
@@ -108,10 +110,12 @@ def marked(row):
 class TouchWatch:
     """Follows both distances over the accepted states of a path, in their order."""
 
-    def __init__(self, contact=False):
+    def __init__(self, contact: bool = False):
         self.contact, self._walls, self._body = contact, _Crossing(), _Crossing()
 
-    def see(self, load, wall_distance, body_distance=np.inf, contact_force=0.0):
+    def see(
+        self, load: Load, wall_distance: float, body_distance: float = np.inf, contact_force: float = 0.0
+    ) -> Touch:
         """The Touch of the state at a Load; the same state may be seen again. Walls that push at each other
         touch, however close."""
         walls, body = (
@@ -138,7 +142,7 @@ class _Crossing:
         return self.met
 
 
-def first_zero(loads, distances):
+def first_zero(loads: Sequence, distances: Sequence[float]) -> np.ndarray:
     """(k,) loads at which the distance passes zero between the last two of loads (n, k), distances (n,), of
     which the last is <= 0, or nan where walls in contact push at each other.
 

@@ -12,7 +12,9 @@ from scipy.spatial import cKDTree
 
 from pneunet.base import se3
 from pneunet.geometry import tags
+from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.fem import surface
+from pneunet.hifi.fem.mixed_field import MixedField
 
 _TOLERANCE = 1e-6
 _NEIGHBOURS = 8
@@ -22,6 +24,10 @@ _DIVISIONS = 4
 
 #: walls are in contact where they push at each other with more than this part of the air's pressure
 IN_CONTACT = 0.1
+
+
+#: facets (n, 6) of nodes, and how far each lies along X1 from its own place (n,), mm
+Wall = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,7 @@ class WallContact:
 class WallDistances:
     """Smallest distance in each gap of a manipulator; evaluated on rank 0 from gathered wall nodes."""
 
-    def __init__(self, problem, manipulator):
+    def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
         facets = surface.facet_nodes(problem, tags.OUTER)
         corners = problem.nodes[facets[:, :3]]
@@ -73,7 +79,7 @@ class WallDistances:
         parts = self.comm.gather(positions[self.facets], root=0)
         return np.concatenate(parts) if self.comm.rank == 0 else None
 
-    def distances(self, array=None):
+    def distances(self, array: np.ndarray | None = None) -> np.ndarray | None:
         """(gaps,) signed smallest distances in mm, on rank 0 (None elsewhere); inf where a gap has no
         walls."""
         each = self.at_nodes(array)
@@ -83,7 +89,7 @@ class WallDistances:
         np.fmin.at(out, self._wall, each.min(axis=1, initial=np.inf))
         return out.reshape(-1, 2).min(axis=1)
 
-    def at_nodes(self, array=None):
+    def at_nodes(self, array: np.ndarray | None = None) -> np.ndarray | None:
         """(facets of all walls, 6) signed distances (mm) of their nodes from the wall that they face, on rank
         0 (None elsewhere)."""
         positions = self._gather(self.problem.nodes + self.problem.displacement(array))
@@ -99,7 +105,7 @@ class WallDistances:
                 out[a] = distances_from(positions[b], points)[inverse.ravel()].reshape(-1, 6)
         return out
 
-    def node_numbers(self, numbers):
+    def node_numbers(self, numbers: np.ndarray) -> np.ndarray | None:
         """(facets of all walls, 6) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes`
         has them."""
         return self._gather(numbers)
@@ -112,7 +118,7 @@ class CellWalls:
     (facets (n, 6) of nodes, shift (n,) in mm, whole pitches that bring a piece to its wall).
     """
 
-    def __init__(self, problem):
+    def __init__(self, problem: MixedField):
         self.problem, s = problem, problem.segment
         facets = surface.facet_nodes(problem, tags.OUTER)
         corners = problem.nodes[facets[:, :3]]
@@ -127,7 +133,7 @@ class CellWalls:
             places = ((first, plane), (second, plane + s.gap / s.sin))
             self.gaps.append([(facets[c], s.pitch * np.round((x - along[c]) / s.pitch)) for c, x in places])
 
-    def positions(self, wall, array=None):
+    def positions(self, wall: Wall, array: np.ndarray | None = None) -> np.ndarray:
         """(n, 6, 3) deformed positions of a wall's nodes, in the section frame at X1 = 0."""
         facets, shift = wall
         e, k = np.split(self.problem.strains.value, 2)
@@ -136,12 +142,12 @@ class CellWalls:
         local = X * [0, 1, 1] + u[facets]
         return np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
 
-    def distance(self):
+    def distance(self) -> float:
         """Smallest signed distance in mm; inf without chambers."""
         pairs = [[self.positions(wall) for wall in gap] for gap in self.gaps]
         return min((min(wall_distance(a, b), wall_distance(b, a)) for a, b in pairs), default=np.inf)
 
-    def contact(self, pressure):
+    def contact(self, pressure: float) -> WallContact:
         """WallContact of the gap with the largest force, `pressure` (MPa) being that of the air."""
         return max((self._contact(gap, pressure) for gap in self.gaps), key=lambda c: c.force)
 
@@ -173,13 +179,13 @@ class CellWalls:
         )
 
 
-def wall_distance(points, wall):
+def wall_distance(points: np.ndarray, wall: np.ndarray) -> float:
     """Smallest signed distance (mm) of the nodes of quadratic facets `points` (n, 6, 3) from the wall (m, 6,
     3)."""
     return float(distances_from(wall, np.unique(points.reshape(-1, 3), axis=0)).min())
 
 
-def distances_from(wall, points):
+def distances_from(wall: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(n,) signed distances (mm) of points (n, 3) from a wall of quadratic facets (m, 6, 3)."""
     triangles = surface.subdivided(wall, _DIVISIONS)
     count = min(_NEIGHBOURS, len(triangles))
@@ -198,7 +204,7 @@ def distances_from(wall, points):
     return np.where(behind, -distance, distance)
 
 
-def closest_point(point, triangle):
+def closest_point(point: np.ndarray, triangle: np.ndarray) -> np.ndarray:
     """Points (..., 3) of triangles (..., 3, 3) closest to points (..., 3); Ericson, Real-Time Collision
     Detection, 5.1.5."""
     a, b, c = triangle[..., 0, :], triangle[..., 1, :], triangle[..., 2, :]

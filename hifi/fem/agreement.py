@@ -1,7 +1,14 @@
 """Errors of one rank, known to all of them before anybody waits in a collective call."""
 
+from collections.abc import Callable
+from typing import TypeVar
 
-def on_rank_0(comm, work):
+from mpi4py import MPI
+
+Result = TypeVar("Result")
+
+
+def on_rank_0(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
     """Run `work` on rank 0; its result, or its error, on all ranks."""
     result, error = None, None
     if comm.rank == 0:

@@ -1,7 +1,9 @@
 """The only place that knows the difference between dolfinx 0.5 (Debian 12) and 0.9 (Debian 13)."""
 
 import logging
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -9,6 +11,9 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.io import gmshio
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+from ufl.core.expr import Expr
 
 from pneunet.base.errors import InputError
 
@@ -28,10 +33,11 @@ _FLAGS = [
 COMPILER = {"cffi_extra_compile_args": _FLAGS, "timeout": 60}
 VERSION = dolfinx.__version__
 MeshTags = dolfinx.mesh.MeshTagsMetaClass if OLD else dolfinx.mesh.MeshTags
+Form = fem.FormMetaClass if OLD else fem.Form
 
 
 @contextmanager
-def quiet_compiler():
+def quiet_compiler() -> Iterator[None]:
     """Compiling logs every gcc line at level INFO, and ffcx has the root logger print that to standard
     error."""
     before = logging.root.manager.disable
@@ -43,7 +49,7 @@ def quiet_compiler():
 
 
 @quiet_compiler()
-def mixed_space(mesh, degree=2):
+def mixed_space(mesh: Mesh, degree: int = 2) -> fem.FunctionSpace:
     """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure on tetrahedra."""
     if OLD:
         u = ufl.VectorElement("CG", mesh.ufl_cell(), degree)
@@ -58,7 +64,7 @@ def mixed_space(mesh, degree=2):
 
 
 @quiet_compiler()
-def cell_vectors(mesh, size):
+def cell_vectors(mesh: Mesh, size: int) -> fem.FunctionSpace:
     """Space of one vector of `size` numbers a cell: tested with it, a form with free components is assembled
     in one pass."""
     if OLD:
@@ -67,13 +73,13 @@ def cell_vectors(mesh, size):
 
 
 @quiet_compiler()
-def compile_form(form):
+def compile_form(form: ufl.Form) -> Form:
     """A compiled form with the project's compiler arguments."""
     return fem.form(form, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER}))
 
 
 @quiet_compiler()
-def expression(mesh, ufl_expression, points):
+def expression(mesh: Mesh, ufl_expression: Expr, points: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """Callable: local cells (n,) -> values (n, points, components) of a UFL expression at reference
     points."""
     compiled = fem.Expression(
@@ -87,7 +93,7 @@ def expression(mesh, ufl_expression, points):
     return evaluate
 
 
-def scatter_add(function):
+def scatter_add(function: fem.Function) -> None:
     """Add ghost contributions onto owners and copy them back."""
     from dolfinx import la
 
@@ -96,7 +102,7 @@ def scatter_add(function):
     function.x.scatter_forward()
 
 
-def read_mesh(path, comm):
+def read_mesh(path: Path | str, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTags]:
     """(mesh, cell tags, facet tags) of a gmsh file, read on rank 0 and distributed."""
     # gmshio.read_from_msh of 0.5 fails by itself, and a failure on rank 0 alone would leave the others
     # waiting
@@ -120,7 +126,7 @@ def read_mesh(path, comm):
             gmsh.finalize()
 
 
-def cell_dofs(space):
+def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
     """(local cells, dofs per cell) blocked dofs of a space."""
     cells = space.mesh.topology.index_map(space.mesh.topology.dim)
     return np.array([space.dofmap.cell_dofs(c) for c in range(cells.size_local + cells.num_ghosts)])

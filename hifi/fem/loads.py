@@ -10,7 +10,7 @@ from pneunet.hifi.fem.mixed_field import MixedField
 from pneunet.hifi.fem.surface import FaceQuadrature
 
 
-class Load:
+class AppliedLoad:
     """`value` times what the load is.
 
     has_tangent: whether its residual's derivative belongs to the tangent; closed: whether that is symmetric.
@@ -33,7 +33,7 @@ class Load:
         """Told before the residual is assembled."""
 
 
-class Pressure(Load):
+class Pressure(AppliedLoad):
     """Follower pressure `value` (MPa) on tagged facets: -P V, so P inner(J inv(F).T N, v) in the residual.
 
     closed: the facets close a cavity, so that the load's tangent is symmetric; an open loaded patch has
@@ -52,7 +52,7 @@ class Pressure(Load):
         return [ufl.inner(area, v) * ds]
 
 
-class Gravity(Load):
+class Gravity(AppliedLoad):
     """Weight: `value` times the acceleration (3,) in mm/s^2 on materials {cell tag: law with a density, or
     one law}."""
 
@@ -67,7 +67,7 @@ class Gravity(Load):
         return parts
 
 
-class EndLoad(Load):
+class EndLoad(AppliedLoad):
     """Dead force (3,) in N and moment (3,) in N mm, fixed in space, on a tagged face, times `value`.
 
     The traction force/A + w x (x - c), c the face's centre and w such that it has exactly this moment about

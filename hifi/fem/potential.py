@@ -25,7 +25,7 @@ class Term:
         return self.stored - self.work if self.work else self.stored
 
 
-class Potential:
+class PotentialEnergy:
     """Stored energy less the loads' work: the sum of `terms` in the state of a field.
 
     residuals, tangents: compiled forms of its first and second derivatives by the state. Each term is

@@ -7,7 +7,9 @@ from pneunet.base import se3
 from pneunet.base.frames import FitMoments, frame_at
 from pneunet.base.strains import RodStrains
 from pneunet.geometry import tags
+from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.fem import surface
+from pneunet.hifi.fem.mixed_field import MixedField
 
 
 class SectionFrames:
@@ -18,7 +20,7 @@ class SectionFrames:
     the clamp's; the tip frame is the fit of the tip face. `stations` (n,) are undeformed arc lengths in mm.
     """
 
-    def __init__(self, problem, manipulator):
+    def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.manipulator = problem, manipulator
         self.comm = problem.mesh.comm
         wall = surface.facet_nodes(problem, tags.CHANNEL)
@@ -37,7 +39,7 @@ class SectionFrames:
         self._integrals.append(surface.SlabIntegral(problem, surface.facet_nodes(problem, tags.TIP)))
         self.stations = np.array([0.0] + [s for s, _ in windows] + [manipulator.length])
 
-    def frames(self, array=None):
+    def frames(self, array: np.ndarray | None = None) -> np.ndarray:
         """(stations, 4, 4) section frames of the current state (or of a state array); the same on all
         ranks."""
         positions = self.problem.nodes + self.problem.displacement(array)
@@ -47,7 +49,7 @@ class SectionFrames:
         motions = np.array([np.eye(4)] + [FitMoments(row).pose() for row in rows])
         return frame_at(motions, self.stations)
 
-    def segment_strains(self, frames):
+    def segment_strains(self, frames: np.ndarray) -> RodStrains:
         """RodStrains of shape (segments, 3): mean of the per-pitch strains between the chambers of each
         segment.
 

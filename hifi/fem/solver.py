@@ -1,5 +1,7 @@
 """Direct linear solver (MUMPS): LDL^T with the inertia of the matrix when it is symmetric, LU otherwise."""
 
+import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 #: MUMPS could not allocate its workspace
@@ -17,7 +19,7 @@ class PredictorTooFar(NotConverged):
 class DirectSolver:
     """MUMPS factorisation of a PETSc matrix: LDL^T when symmetric (a closed cavity), LU otherwise."""
 
-    def __init__(self, matrix, comm, symmetric=True):
+    def __init__(self, matrix: PETSc.Mat, comm: MPI.Comm, symmetric: bool = True):
         self.matrix, self.comm, self.symmetric, self.factorisations = matrix, comm, symmetric, 0
         self._solution, self._right = matrix.createVecs()
         self._set_up()
@@ -45,7 +47,7 @@ class DirectSolver:
     def _count(self):
         return self.matrix.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
 
-    def factorise(self):
+    def factorise(self) -> None:
         # for a new pattern PETSc makes a new factor, without what was set above
         if self._count() != self._nonzeros:
             self.ksp.destroy()
@@ -60,17 +62,17 @@ class DirectSolver:
             raise NotConverged(f"the tangent could not be factorised (MUMPS error {code})")
 
     @property
-    def negative_pivots(self):
+    def negative_pivots(self) -> int | None:
         """Number of negative eigenvalues of the factorised matrix (Sylvester); None for LU."""
         return self.ksp.getPC().getFactorMatrix().getMumpsInfog(12) if self.symmetric else None
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """K^-1 right, (owned rows,) arrays."""
         self._right.array[:] = right
         self.ksp.solve(self._right, self._solution)
         return self._solution.array.copy()
 
-    def solve_many(self, right):
+    def solve_many(self, right: np.ndarray) -> np.ndarray:
         """K^-1 right, (rows, columns) arrays on one rank: all columns in one pass through the factors."""
         b = PETSc.Mat().createDense(right.shape, array=right.copy(order="F"), comm=PETSc.COMM_SELF)
         x = b.duplicate()
@@ -80,7 +82,7 @@ class DirectSolver:
         x.destroy()
         return solution
 
-    def destroy(self):
+    def destroy(self) -> None:
         self.ksp.destroy()
         self._solution.destroy()
         self._right.destroy()

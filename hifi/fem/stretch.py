@@ -5,6 +5,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pneunet.hifi.fem import compat
+from pneunet.hifi.fem.mixed_field import MixedField
 
 #: the 4-point rule of degree 2 on the reference tetrahedron (inside the cell: vertices of re-entrant corners
 #: are singular)
@@ -15,7 +16,7 @@ POINTS = np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]])
 class PrincipalStretch:
     """Largest principal stretch at the 4 interior points of every cell, or of these local `cells`."""
 
-    def __init__(self, problem, cells=None):
+    def __init__(self, problem: MixedField, cells: np.ndarray | None = None):
         self.problem, mesh = problem, problem.mesh
         self._gradient = compat.expression(mesh, problem.deformation_gradient, POINTS)
         self._cells = (
@@ -26,12 +27,12 @@ class PrincipalStretch:
         self._sum = fem.Function(space)
         self._count = self._add_up(np.ones(len(self._cells))).copy()
 
-    def cellwise(self):
+    def cellwise(self) -> np.ndarray:
         """(owned cells, 4) largest principal stretches at the current state."""
         F = self._gradient(self._cells).reshape(len(self._cells), len(POINTS), 3, 3)
         return np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F)[..., -1])
 
-    def largest(self):
+    def largest(self) -> float:
         values = self.cellwise()
         return float(self.problem.mesh.comm.allreduce(values.max(initial=0.0), op=MPI.MAX))
 
@@ -44,6 +45,6 @@ class PrincipalStretch:
         compat.scatter_add(self._sum)
         return nodal
 
-    def nodal(self):
+    def nodal(self) -> np.ndarray:
         """(local P2 nodes,) mean of the cells around each node, for pictures."""
         return self._add_up(self.cellwise().mean(axis=1)) / self._count

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from pneunet.hifi.fem.mixed_field import MixedField
+
 #: edges of dolfinx's reference tetrahedron, in the order of its P2 edge nodes 4..9
 EDGES = [(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]
 #: local P2 nodes of the facet opposite each vertex: three corners, then the mid-edges (01, 12, 20)
@@ -12,7 +14,7 @@ for _opposite in range(4):
     FACETS.append(_corners + [4 + EDGES.index(e) for e in _edges])
 
 
-def facet_nodes(problem, *tags):
+def facet_nodes(problem: MixedField, *tags: int) -> np.ndarray:
     """(facets, 6) displacement nodes of the tagged facets on this rank, corners ordered so that normals point
     out.
 
@@ -44,7 +46,7 @@ def facet_nodes(problem, *tags):
     return np.array(rows, dtype=int).reshape(-1, 6)
 
 
-def reference_areas(problem, facets):
+def reference_areas(problem: MixedField, facets: np.ndarray) -> np.ndarray:
     """(facets,) undeformed areas in mm^2."""
     a, b, c = (problem.nodes[facets[:, i]] for i in range(3))
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
@@ -58,7 +60,7 @@ _BARYCENTRIC = np.array(
 _WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 
 
-def p2_shape(barycentric):
+def p2_shape(barycentric: np.ndarray) -> np.ndarray:
     """(..., 6) quadratic shape functions at barycentric coordinates (..., 3); corners, then mid-edges 01, 12,
     20."""
     a, b, c = np.moveaxis(barycentric, -1, 0)
@@ -67,7 +69,7 @@ def p2_shape(barycentric):
     )
 
 
-def subdivision(divisions):
+def subdivision(divisions: int) -> np.ndarray:
     """(divisions^2, 3, 6) quadratic shape functions at the corners of a facet's flat parts, of its own
     orientation."""
     n = divisions
@@ -77,7 +79,7 @@ def subdivision(divisions):
     return p2_shape(np.concatenate([1 - corners.sum(axis=-1, keepdims=True), corners], axis=-1))
 
 
-def subdivided(facets, divisions):
+def subdivided(facets: np.ndarray, divisions: int) -> np.ndarray:
     """(facets divisions^2, 3, 3) flat triangles between points of quadratic facets (facets, 6, 3), same
     orientation."""
     return np.einsum("tcn,fni->ftci", subdivision(divisions), facets).reshape(-1, 3, 3)
@@ -103,7 +105,7 @@ class SlabIntegral:
     area (mm2); centre (3,) = int X dA; nodes (n,); weights (n,) = int N dA; first (n, 3) = int X N dA.
     """
 
-    def __init__(self, problem, facets, low=-np.inf, high=np.inf):
+    def __init__(self, problem: MixedField, facets: np.ndarray, low: float = -np.inf, high: float = np.inf):
         X1 = problem.nodes[facets[:, :3], 0]
         facets = facets[(X1.max(axis=1) > low) & (X1.min(axis=1) < high)]
         corners = problem.nodes[facets[:, :3]]
@@ -128,7 +130,7 @@ class SlabIntegral:
                 np.add.at(self.weights, row, w @ N)
                 np.add.at(self.first, row, np.einsum("q,qi,qn->ni", w, X, N))
 
-    def moments(self, positions):
+    def moments(self, positions: np.ndarray) -> np.ndarray:
         """(16,) moments of the rigid fit from the undeformed surface to nodal `positions` (all local nodes,
         3)."""
         x = positions[self.nodes]
@@ -139,13 +141,13 @@ class FaceQuadrature:
     """Integrals over a tagged face of quantities that depend on the deformed position; weights are reference
     areas."""
 
-    def __init__(self, problem, tag):
+    def __init__(self, problem: MixedField, tag: int):
         self.comm = problem.mesh.comm
         self._facets = facet_nodes(problem, tag)
         self._weights = np.outer(reference_areas(problem, self._facets), _WEIGHTS)
         self._shape = p2_shape(_BARYCENTRIC)
 
-    def moments(self, positions):
+    def moments(self, positions: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         """(area, centre (3,), central second moment (3, 3) in mm^4) of the face at nodal `positions` (all
         local nodes, 3)."""
         x = np.einsum("qn,fni->fqi", self._shape, positions[self._facets])
@@ -157,7 +159,9 @@ class FaceQuadrature:
         area, centre = sums[0], sums[1:4] / sums[0]
         return area, centre, sums[4:].reshape(3, 3) - area * np.outer(centre, centre)
 
-    def traction(self, positions, force, moment):
+    def traction(
+        self, positions: np.ndarray, force: np.ndarray, moment: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(spread, spin, centre), each (3,): the traction spread + spin x (x - centre) has this force (N),
         and this moment (N mm) about the face's present centre."""
         area, centre, second = self.moments(positions)
@@ -166,7 +170,9 @@ class FaceQuadrature:
         )
         return np.asarray(force) / area, spin, centre
 
-    def forces(self, positions, spread, spin, centre):
+    def forces(
+        self, positions: np.ndarray, spread: np.ndarray, spin: np.ndarray, centre: np.ndarray
+    ) -> np.ndarray:
         """(local nodes, 3) nodal forces in N of the traction spread + spin x (x - centre), MPa; this rank's
         facets only."""
         x = np.einsum("qn,fni->fqi", self._shape, positions[self._facets])

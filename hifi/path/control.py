@@ -1,15 +1,9 @@
 """What closes the equations for the load along a path: the load itself, the cavity's volume, or the arc
-length.
-
-A control offers, for the path's scalar parameter,
-    satisfied(system, parameter)                   whether its own equation holds
-    close(system, parameter, step, load_step)      the correction completed so that its linearised equation
-                                                   holds
-    tangent(system) -> (d state, d load)           per unit of the parameter, with the factorised tangent
-    accepted(parameter, system)                    told after every accepted state
-"""
+length."""
 
 import numpy as np
+
+from pneunet.hifi.path.system import System
 
 
 class LoadControl:
@@ -17,16 +11,18 @@ class LoadControl:
 
     name = "load"
 
-    def satisfied(self, system, parameter):
+    def satisfied(self, system: System, parameter: float) -> bool:
         return system.load == parameter
 
-    def close(self, system, parameter, step, load_step):
+    def close(
+        self, system: System, parameter: float, step: np.ndarray, load_step: float
+    ) -> tuple[np.ndarray, float]:
         return step, 0.0  # the predictor has set the load
 
-    def tangent(self, system):
+    def tangent(self, system: System) -> tuple[np.ndarray, float]:
         return -system.solve(system.load_gradient()), 1.0
 
-    def accepted(self, parameter, system):
+    def accepted(self, parameter: float, system: System) -> None:
         pass
 
 
@@ -34,19 +30,21 @@ class _Bordered:
     """One more unknown, the load, and one more equation g(state) = parameter with gradient `row`: block
     elimination."""
 
-    def close(self, system, parameter, step, load_step):
+    def close(
+        self, system: System, parameter: float, step: np.ndarray, load_step: float
+    ) -> tuple[np.ndarray, float]:
         along = -system.solve(system.load_gradient())
         row = self.row(system)
         missing = -self.gap(system, parameter) - system.dot(row, step)
         change = missing / system.dot(row, along)
         return step + change * along, load_step + change
 
-    def tangent(self, system):
+    def tangent(self, system: System) -> tuple[np.ndarray, float]:
         along = -system.solve(system.load_gradient())
         rate = system.dot(self.row(system), along)
         return along / rate, 1.0 / rate
 
-    def accepted(self, parameter, system):
+    def accepted(self, parameter: float, system: System) -> None:
         pass
 
 
@@ -61,13 +59,13 @@ class VolumeControl(_Bordered):
     name = "volume"
     relative_tolerance = 1e-10
 
-    def gap(self, system, parameter):
+    def gap(self, system: System, parameter: float) -> float:
         return system.volume() - parameter
 
-    def row(self, system):
+    def row(self, system: System) -> np.ndarray:
         return -system.load_gradient()
 
-    def satisfied(self, system, parameter):
+    def satisfied(self, system: System, parameter: float) -> bool:
         return abs(self.gap(system, parameter)) <= self.relative_tolerance * abs(parameter)
 
 
@@ -80,7 +78,7 @@ class ArcLength(_Bordered):
 
     name = "arc length"
 
-    def __init__(self, system):
+    def __init__(self, system: System):
         self._last, self._parameter = system.positions().copy(), 0.0
         self._direction = None
 
@@ -90,17 +88,17 @@ class ArcLength(_Bordered):
             self._direction = along / np.sqrt(system.mean_square(along, along))
         return self._direction
 
-    def gap(self, system, parameter):
+    def gap(self, system: System, parameter: float) -> float:
         moved = system.positions() - self._last
         return system.mean_square(self._secant(system), moved) - (parameter - self._parameter)
 
-    def row(self, system):
+    def row(self, system: System) -> np.ndarray:
         return system.mean_square_row(self._secant(system))
 
-    def satisfied(self, system, parameter):
+    def satisfied(self, system: System, parameter: float) -> bool:
         return abs(self.gap(system, parameter)) <= 1e-8 * abs(parameter - self._parameter)
 
-    def accepted(self, parameter, system):
+    def accepted(self, parameter: float, system: System) -> None:
         moved = system.positions() - self._last
         length = np.sqrt(system.mean_square(moved, moved))
         if length > 0:

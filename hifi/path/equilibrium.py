@@ -1,14 +1,16 @@
 """The equilibrium path of a system under a growing control parameter: predictor, corrector, memory, limit
 points."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.fem.solver import NotConverged, PredictorTooFar
-from pneunet.hifi.path.newton import Newton
+from pneunet.hifi.path.newton import Newton, NewtonOptions
 from pneunet.hifi.path.stepping import lagrange_coefficients
+from pneunet.hifi.path.system import Control, System
 
 #: a compliance that has grown this often since the start announces a limit point of the load
 SOFTENED = 4.0
@@ -44,7 +46,7 @@ class LimitPoint:
         return {"pressure_kPa": self.load * KPA_PER_MPA, "volume_mm3": self.volume, "kind": self.kind}
 
 
-def limit_point(three):
+def limit_point(three: Sequence[PathState]) -> LimitPoint | None:
     """The LimitPoint between three consecutive PathStates, by the parabola through them; None when the load
     goes on."""
     p, loads, volumes = (
@@ -66,7 +68,9 @@ class EquilibriumPath:
 
     memory = 3
 
-    def __init__(self, system, control, options=None, start=0.0):
+    def __init__(
+        self, system: System, control: Control, options: NewtonOptions | None = None, start: float = 0.0
+    ):
         self.system, self.control = system, control
         self.newton = Newton(system, control, options)
         self.parameter = start
@@ -106,7 +110,12 @@ class EquilibriumPath:
         gradient = self.system.load_gradient()
         return self.system.dot(gradient, self.system.solve(gradient))
 
-    def resume(self, accepted, trusted, factorised_at=None):
+    def resume(
+        self,
+        accepted: Sequence[PathState],
+        trusted: float,
+        factorised_at: tuple[np.ndarray, float] | None = None,
+    ) -> None:
         """Go on from the `accepted` PathStates of another run, lagging the tangent at `factorised_at` (state,
         load) as it did."""
         self.accepted, self.trusted, self.parameter = list(accepted), trusted, accepted[-1].parameter
@@ -122,7 +131,7 @@ class EquilibriumPath:
     def _back(self, kept):
         self.system.state, self.system.load = kept.state, kept.load
 
-    def advance(self, parameter):
+    def advance(self, parameter: float) -> tuple[int, int, float]:
         """Solve at `parameter`; (iterations, factorisations, residual). NotConverged restores the accepted
         state."""
         system, newton, before = self.system, self.newton, self.system.factorisations
@@ -155,7 +164,7 @@ class EquilibriumPath:
             self.limit_points += [found] if found else []
         return result.iterations, system.factorisations - before, result.residuals[-1]
 
-    def diagnosis(self):
+    def diagnosis(self) -> str:
         """What the tangent of the last accepted state says when no further step converges; '' when it has
         nothing to say.
 

@@ -5,8 +5,12 @@ gap; one that leaves takes it away. Its column K^-1 g costs one solve, much less
 serves until the next one.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
+#: {point of a wall, its side, facet and Gauss point: N/mm}
+Stiffnesses = dict[tuple[int, int, int], float]
 #: of the largest stiffness of a point: smaller changes are left to the iterations
 SMALLEST = 0.02
 
@@ -15,7 +19,12 @@ class ContactUpdate:
     """K^-1 of a factorised tangent K, corrected to (K + U^T D U)^-1: U the gap gradients (m, n), D stiffness
     changes (m,) in N/mm."""
 
-    def __init__(self, stiffnesses=None, most=200, total=lambda part: part):
+    def __init__(
+        self,
+        stiffnesses: Stiffnesses | None = None,
+        most: int = 200,
+        total: Callable[[np.ndarray], np.ndarray] = lambda part: part,
+    ):
         """stiffnesses: {point: N/mm} in the factorised tangent. most: columns above which a factorisation is
         cheaper. total: sums over the ranks that hold parts of (n,)."""
         self._most, self._total = most, total
@@ -23,7 +32,12 @@ class ContactUpdate:
         self._rows = self._columns = None
         self._changes = np.zeros(0)
 
-    def renew(self, now, gradients, solve):
+    def renew(
+        self,
+        now: Stiffnesses,
+        gradients: Callable[[list], np.ndarray],
+        solve: Callable[[np.ndarray], np.ndarray],
+    ) -> bool | None:
         """Take the present stiffnesses {point: N/mm}; True where the tangent has changed, False where not,
         None where a new factorisation is due.
 
@@ -44,7 +58,7 @@ class ContactUpdate:
         before, self._changes = self._changes, np.array([changes.get(p, 0.0) for p in places])
         return len(before) < len(places) or bool((np.abs(before - self._changes) > SMALLEST * largest).any())
 
-    def corrected(self, solution):
+    def corrected(self, solution: np.ndarray) -> np.ndarray:
         """(K + U^T D U)^-1 r from `solution` (n,) = K^-1 r."""
         if self._rows is None:
             return solution

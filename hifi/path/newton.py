@@ -1,34 +1,24 @@
 """Newton's method with a lagged tangent and secant acceleration, for any system and any control.
 
-A *system* (hifi.body.system, hifi.cell.system) has a state (an array), a scalar `load` (pressure, a fraction
-of gravity, ...), and
-    residual() -> ((n,) array, scale)     what must vanish, and the norm of the forces it balances
-    load_gradient() -> (n,)               d residual / d load
-    factorise(), solve((n,)) -> (n,)      the tangent at the current state; K^-1 times an array, K possibly an
-                                          older one
-    moved(state, increment), dot(a, b)    retraction and inner product (over all ranks)
-    volume(), unstable                    cavity volume (mm3); unstable directions of the factorised state
-                                          (None: unknown)
-    renew(), overreach                    of walls that touch: brings the tangent up to date with what touches
-                                          now (hifi.path.low_rank);
-                                          how deep they overlap at the last residual, over what a correction
-                                          may make of it
-A *control* (hifi.path.control) closes the equations for the load. Between factorisations, steps are corrected
-by the secants seen so far (Anderson 1965; multisecant quasi-Newton of type II, Fang & Saad, Numer. Linear
-Algebra Appl. 16, 2009): the residual that the past increments explain is removed before the lagged tangent
-sees the rest. One solve and one residual an iteration. On slender bodies a lagged tangent is no help once
-walls have bulged, however small the step. What it makes worse is taken back, which costs a solve, and the
-tangent is factorised where the correction started: steps can be many times longer. Where walls touch, each
-change of what touches renews the tangent (an active-set iteration), and corrections that drive walls far into
-each other, unseen by a tangent that knew of no contact there, are shortened.
+Between factorisations, steps are corrected by the secants seen so far (Anderson 1965; multisecant
+quasi-Newton of type II, Fang & Saad, Numer. Linear Algebra Appl. 16, 2009): the residual that the past
+increments explain is removed before the lagged tangent sees the rest. One solve and one residual an
+iteration. On slender bodies a lagged tangent is no help once walls have bulged, however small the step. What
+it makes worse is taken back, which costs a solve, and the tangent is factorised where the correction started:
+steps can be many times longer. Where walls touch, each change of what touches renews the tangent (an
+active-set iteration), and corrections that drive walls far into each other, unseen by a tangent that knew of
+no contact there, are shortened.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
 from pneunet.hifi.fem.solver import NotConverged
+from pneunet.hifi.path.system import Control, System
 
 #: how often a correction is shortened at most
 SHORTENINGS = 4
@@ -65,30 +55,30 @@ class NewtonResult:
 class Newton:
     """Iterates a system to equilibrium at a value of its control's parameter."""
 
-    def __init__(self, system, control, options=None):
+    def __init__(self, system: System, control: Control, options: NewtonOptions | None = None):
         self.system, self.control = system, control
         self.options = options or NewtonOptions()
         self.current = False  # whether there is a factorisation to lag
         self.factorised_at = None  # (state, load) of that factorisation
         self.timings = {"residual": 0.0, "factorise": 0.0, "renew": 0.0, "solve": 0.0}
 
-    def timed(self, name, function, *arguments):
+    def timed(self, name: str, function: Callable, *arguments: Any) -> Any:
         start = perf_counter()
         try:
             return function(*arguments)
         finally:
             self.timings[name] += perf_counter() - start
 
-    def factorise(self):
+    def factorise(self) -> None:
         self.timed("factorise", self.system.factorise)
         self.current, self.factorised_at = True, (self.system.state.copy(), self.system.load)
 
-    def residual(self):
+    def residual(self) -> tuple[np.ndarray, float, float]:
         """(residual, its norm, norm of the forces it balances)."""
         r, scale = self.timed("residual", self.system.residual)
         return r, np.sqrt(self.system.dot(r, r)), scale
 
-    def solve(self, parameter):
+    def solve(self, parameter: float) -> NewtonResult:
         """Iterate from the current state to equilibrium at the control's `parameter`; NotConverged
         otherwise."""
         o, system, control = self.options, self.system, self.control
@@ -159,19 +149,19 @@ class Newton:
 class Secants:
     """Pairs of increments and residual changes since the last factorisation."""
 
-    def __init__(self, system, most):
+    def __init__(self, system: System, most: int):
         self.system, self.most = system, most
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         self._steps, self._loads, self._changes = [], [], []
 
-    def add(self, step, load_step, change):
+    def add(self, step: np.ndarray, load_step: float, change: np.ndarray) -> None:
         for rows, row in ((self._steps, step), (self._loads, load_step), (self._changes, change)):
             rows.append(row)
             del rows[: max(0, len(rows) - self.most)]
 
-    def explain(self, r):
+    def explain(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray | float, float]:
         """(the rest of r, increment, load increment) that past changes explain in the least-squares sense."""
         if not self._changes:
             return r, 0.0, 0.0
@@ -185,7 +175,7 @@ class Secants:
         )
 
 
-def iterations_left(history, tolerance):
+def iterations_left(history: list[float], tolerance: float) -> float:
     """Iterations to `tolerance` at the mean rate of the last two corrections; 0 when there is no rate yet."""
     if len(history) < 2:
         return 0.0

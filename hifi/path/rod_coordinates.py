@@ -8,6 +8,8 @@ geodesic of SE(3). One station makes it a plain update with one rigid motion tak
 spheres and manipulators.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
@@ -20,7 +22,7 @@ class RodCoordinates:
     """Hat functions over stations of the undeformed x axis for the nodes (n, 3) this rank sees, `owned` of
     them first."""
 
-    def __init__(self, nodes, owned, comm, spacing=None):
+    def __init__(self, nodes: np.ndarray, owned: int, comm: MPI.Comm, spacing: float | None = None):
         self.nodes, self.owned, self.comm = nodes, owned, comm
         x = nodes[:, 0]
         low = comm.allreduce(x.min() if len(x) else np.inf, op=MPI.MIN)
@@ -50,7 +52,7 @@ class RodCoordinates:
             self.fraction * between[self.right] * (self.right > self.left)[:, None]
         )
 
-    def motions(self, positions):
+    def motions(self, positions: np.ndarray) -> np.ndarray:
         """Rigid motions (stations, 4, 4) that carry the undeformed stations' material closest to `positions`
         (n, 3)."""
         X, x = self.nodes[: self.owned], positions[: self.owned]
@@ -58,12 +60,12 @@ class RodCoordinates:
         sums = self._sum_over_stations(np.hstack([np.ones((len(X), 1)), X, x, outer]))
         return np.array([FitMoments(row).pose() for row in sums])
 
-    def sections(self, positions):
+    def sections(self, positions: np.ndarray) -> np.ndarray:
         """Section motions (n, 4, 4) at the nodes' own x, from the stations' ones."""
         motions = self.motions(positions)
         return self._interpolate(motions, se3.log_pose(_relative(motions)))
 
-    def extrapolate(self, histories, coefficients):
+    def extrapolate(self, histories: Sequence[np.ndarray], coefficients: Sequence[float]) -> np.ndarray:
         """Positions (n, 3) extrapolated from earlier ones (m of (n, 3)) with Lagrange coefficients (m,)."""
         relative = [_relative(self.motions(x)) for x in histories]
         # logs relative to the latest state stay far from pi
@@ -75,7 +77,7 @@ class RodCoordinates:
         )
         return _apply(self._interpolate(_chain(predicted), se3.log_pose(predicted)), local)
 
-    def retract(self, positions, increment):
+    def retract(self, positions: np.ndarray, increment: np.ndarray) -> np.ndarray:
         """Positions (n, 3) after a displacement increment (n, 3), equal to their sum to first order.
 
         V(s): spatial twist that fits the increment at the stations, linear between them. The motion M of the

@@ -5,7 +5,9 @@ took.
 """
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from pneunet.base.errors import ConvergenceError
 from pneunet.hifi.fem.solver import NotConverged, PredictorTooFar
@@ -48,7 +50,7 @@ class StepResult:
     diagnosis: str = ""
 
 
-def lagrange_coefficients(known, wanted):
+def lagrange_coefficients(known: Sequence[float], wanted: float) -> list[float]:
     """Weights (m,) of values at loads `known` (m,) that extrapolate them to `wanted`."""
     weights = []
     for i, a in enumerate(known):
@@ -60,14 +62,31 @@ def lagrange_coefficients(known, wanted):
     return weights
 
 
-def run_steps(path, target, size, on_step=lambda step: None, before=None):
+class LoadPath(Protocol):
+    """What is stepped along, by a parameter."""
+
+    parameter: float
+
+    def advance(self, parameter: float) -> tuple[int, int, float]:
+        """(iterations, factorisations, residual) there; NotConverged with the last accepted state
+        restored."""
+
+    def diagnosis(self) -> str:
+        """Words on why it cannot go on."""
+
+
+def run_steps(
+    path: LoadPath,
+    target: float,
+    size: StepSize,
+    on_step: Callable[[Step], None] = lambda step: None,
+    before: Step | None = None,
+) -> StepResult:
     """Drive `path` from its current load to `target`; return a StepResult.
 
-    path.parameter, path.advance(load) -> (iterations, factorisations, residual) or NotConverged with the path
-    restored to its last accepted state, path.diagnosis() -> words on why it cannot go on. `on_step(step)` is
-    called after each accepted step (hooks write results there). `before`: the last Step of a run that this
-    one continues; its numbers, seconds and step size go on. Raises ConvergenceError, with the StepResult as
-    its `result`, when steps fall below size.smallest.
+    `on_step(step)` is called after each accepted step (hooks write results there). `before`: the last Step of
+    a run that this one continues; its numbers, seconds and step size go on. Raises ConvergenceError, with the
+    StepResult as its `result`, when steps fall below size.smallest.
     """
     result = StepResult()
     milestones = sorted({m for m in size.milestones if path.parameter < m < target} | {target})

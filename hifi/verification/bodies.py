@@ -4,25 +4,31 @@ them (mm).
 Faces are tagged alike: the planes x, y, z = 0, the inner and the outer surface of a round body, the far ends.
 """
 
-import gmsh
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
 import numpy as np
-from dolfinx.mesh import CellType, create_box, locate_entities_boundary, meshtags
+from dolfinx.mesh import CellType, Mesh, create_box, locate_entities_boundary, meshtags
 from mpi4py import MPI
 
 from pneunet.hifi.fem import compat
 
+#: (mesh, cell tags, facet tags)
+TaggedMesh = tuple[Mesh, compat.MeshTags, compat.MeshTags]
 INNER, PLANE_X, PLANE_Y, PLANE_Z, OUTER, END, END_Y, END_Z = range(1, 9)
 
 
-def round_body(folder, name, size, solid=1):
+def round_body(folder: Path, name: str, size: float, solid: int = 1) -> TaggedMesh:
     """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or
     axis; solid: tag of its cells."""
+    import gmsh
+
     comm, path = MPI.COMM_WORLD, folder / f"{name}.msh"
     if comm.rank == 0:
         gmsh.initialize()
         gmsh.option.setNumber("General.Terminal", 0)
         draw, classify, radius = ROUND[name]
-        volume = draw()
+        volume = draw(gmsh.model.occ)
         gmsh.model.occ.synchronize()
         groups = {}
         for _, face in gmsh.model.getBoundary([(3, volume)], oriented=False):
@@ -43,34 +49,31 @@ def round_body(folder, name, size, solid=1):
     return compat.read_mesh(path, comm)
 
 
-def _octant(solid, length=3.0):
-    box = gmsh.model.occ.addBox(0, 0, 0, length, 3, 3)
-    return gmsh.model.occ.intersect(solid, [(3, box)])[0][0][1]
+def _octant(occ, solid, length=3.0):
+    return occ.intersect(solid, [(3, occ.addBox(0, 0, 0, length, 3, 3))])[0][0][1]
 
 
-def sphere():
+def sphere(occ: type) -> int:
     """An eighth of a sphere with radii 1 and 2."""
-    occ = gmsh.model.occ
-    return _octant(occ.cut([(3, occ.addSphere(0, 0, 0, 2))], [(3, occ.addSphere(0, 0, 0, 1))])[0])
+    return _octant(occ, occ.cut([(3, occ.addSphere(0, 0, 0, 2))], [(3, occ.addSphere(0, 0, 0, 1))])[0])
 
 
 #: axial length of the slice of a tube
 SLICE = 0.25
 
 
-def tube():
+def tube(occ: type) -> int:
     """A quarter of a slice of a tube along x with radii 1 and 2."""
-    occ = gmsh.model.occ
     return _octant(
+        occ,
         occ.cut(
             [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 2))], [(3, occ.addCylinder(0, 0, 0, SLICE, 0, 0, 1))]
-        )[0]
+        )[0],
     )
 
 
-def cylinder(layers=4):
+def cylinder(occ: type, layers: int = 4) -> int:
     """Solid cylinder of radius 1 and length 1 along x, its mesh the same on both ends."""
-    occ = gmsh.model.occ
     disk = [(2, occ.addDisk(0, 0, 0, 1, 1))]
     occ.rotate(disk, 0, 0, 0, 0, 1, 0, np.pi / 2)
     return next(tag for dim, tag in occ.extrude(disk, 1, 0, 0, numElements=[layers]) if dim == 3)
@@ -89,8 +92,8 @@ def _cylinder_faces(box):
     return PLANE_X if box[3] < 1e-4 else END if box[0] > 1 - 1e-4 else OUTER
 
 
-#: name -> (draws the solid and returns its volume, tag of a face from its bounding box, what edge lengths go
-#: with)
+#: name -> (draws the solid with gmsh.model.occ and returns its volume, tag of a face from its bounding box,
+#: what edge lengths go with)
 ROUND = {
     "sphere": (sphere, _hollow_faces, "sqrt(x*x+y*y+z*z)"),
     "tube": (tube, lambda box: _hollow_faces(box, SLICE), "sqrt(y*y+z*z)"),
@@ -98,7 +101,12 @@ ROUND = {
 }
 
 
-def box(lengths, counts, move=None, solid=1):
+def box(
+    lengths: Sequence[float],
+    counts: Sequence[int],
+    move: Callable[[np.ndarray], np.ndarray] | None = None,
+    solid: int = 1,
+) -> TaggedMesh:
     """(mesh, cell tags, facet tags) of a box from the origin, each of its (nx, ny, nz) bricks cut into 6
     tetrahedra.
 
@@ -128,6 +136,6 @@ def box(lengths, counts, move=None, solid=1):
     )
 
 
-def strip(lengths, counts):
+def strip(lengths: Sequence[float], counts: Sequence[int]) -> TaggedMesh:
     """A box along x whose axis runs through the middle of its section."""
     return box(lengths, counts, lambda X: X - [0.0, lengths[1] / 2, lengths[2] / 2])

@@ -2,19 +2,20 @@
 their forces are known."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.hifi.cell.problem import CellProblem
-from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellState, CellSystem
 from pneunet.hifi.path.control import LoadControl
 from pneunet.hifi.path.equilibrium import EquilibriumPath
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
 from pneunet.hifi.verification import bodies, closed_forms
-from pneunet.hifi.verification.following import Comparison
+from pneunet.hifi.verification.following import ExactComparison
 
 CURVATURES = (0.1, 0.25, 0.5)
 REST = np.eye(6)[0]
@@ -31,7 +32,7 @@ class Solid:
     sides: tuple = ()
 
 
-def held_at(problem, held, strains):
+def held_at(problem: CellProblem, held: np.ndarray, strains: np.ndarray) -> CellState:
     """(CellState at the `strains` (6,) that are `held` (6,) bool, the others free; unknowns)."""
     system = CellSystem(problem, held, (0.0, 0.0), (REST, np.where(held, strains - REST, 0.0)))
     path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
@@ -41,7 +42,9 @@ def held_at(problem, held, strains):
     return state
 
 
-def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
+def torsion(
+    folder: Path, size: float = 0.3, stretch: float = 1.2, twist: float = 0.5
+) -> list[ExactComparison]:
     """Torque and axial force of the cylinder as a cell; the gauge is its whole mantle."""
     problem = CellProblem(
         Solid(1.0, 2.0), bodies.round_body(folder, "cylinder", size, tags.BODY), (bodies.OUTER,), centre=0.5
@@ -50,12 +53,14 @@ def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
     torque, axial = closed_forms.torsion(stretch, twist)
     told, at = (f"h = {size:g}", problem.unknowns), f"at lambda = {stretch:g}, psi = {twist:g}"
     return [
-        Comparison("cell: solid cylinder", f"torque {at}", *told, torque, state.moment[0]),
-        Comparison("cell: solid cylinder", f"axial force {at}", *told, axial, state.force[0]),
+        ExactComparison("cell: solid cylinder", f"torque {at}", *told, torque, state.moment[0]),
+        ExactComparison("cell: solid cylinder", f"axial force {at}", *told, axial, state.force[0]),
     ]
 
 
-def flexure(cells=(2, 16), pitch=0.2, thickness=0.07):
+def flexure(
+    cells: tuple[int, int] = (2, 16), pitch: float = 0.2, thickness: float = 0.07
+) -> list[ExactComparison]:
     """Moments of the block as a cell, its stretch free; rollers on its sides, the gauge on its top and
     bottom."""
     box = bodies.box(
@@ -70,7 +75,7 @@ def flexure(cells=(2, 16), pitch=0.2, thickness=0.07):
         state = held_at(problem, held, np.array([1.0, 0, 0, 0, k, 0]))
         told = f"{cells[0]} x 1 x {cells[1]}", problem.unknowns
         rows.append(
-            Comparison(
+            ExactComparison(
                 "cell: flexed block",
                 f"M at k = {k:g}",
                 *told,

@@ -9,7 +9,7 @@ from scipy.optimize import brentq, fsolve
 SPHERE_LIMIT = 1.828147, 0.81642365
 
 
-def sphere_pressure(a):
+def sphere_pressure(a: float) -> float:
     """Pressure of the inflated sphere at inner radius a."""
 
     def f(stretch):
@@ -18,23 +18,23 @@ def sphere_pressure(a):
     return f((a**3 + 7) ** (1 / 3) / 2) - f(a)
 
 
-def sphere_radius(P):
+def sphere_radius(P: float) -> float:
     """Inner radius below the limit point."""
     return brentq(lambda a: sphere_pressure(a) - P, 1.0, SPHERE_LIMIT[0], xtol=1e-12)
 
 
-def tube_pressure(a):
+def tube_pressure(a: float) -> float:
     """Pressure of the tube held at its length, at inner radius a."""
     b = np.sqrt(a * a + 3)
     return np.log(2 * a / b) + (a * a - 1) / 2 * (1 / a**2 - 1 / b**2)
 
 
-def tube_radius(P):
+def tube_radius(P: float) -> float:
     """Inner radius of the tube held at its length."""
     return brentq(lambda a: tube_pressure(a) - P, 1.0, 10.0, xtol=1e-12)
 
 
-def capped_tube(P):
+def capped_tube(P: float) -> np.ndarray:
     """(inner radius, axial stretch) of the infinite capped tube: radial equilibrium and thrust P pi a^2."""
     r, w = np.polynomial.legendre.leggauss(40)
 
@@ -50,7 +50,7 @@ def capped_tube(P):
     return fsolve(residual, [1 + P / 2, 1.0], xtol=1e-12)
 
 
-def torsion(stretch, twist):
+def torsion(stretch: float, twist: float) -> tuple[float, float]:
     """(torque, axial force) of a solid cylinder of radius 1 at this stretch and twist per undeformed
     length."""
     a2 = 1 / stretch
@@ -59,14 +59,14 @@ def torsion(stretch, twist):
     ) - np.pi * twist**2 * a2**2 / 4
 
 
-def flexure_radii(k):
+def flexure_radii(k: float) -> tuple[float, float]:
     """(inner, outer) radius of a block of height 1 bent to the angle k per undeformed length, in plane
     strain."""
     inner = np.sqrt(np.sqrt(1 / k**2 + 1 / k**4) - 1 / k)
     return inner, 1 / (k * k * inner)
 
 
-def flexure_moment(k):
+def flexure_moment(k: float) -> float:
     """Moment per thickness of that block: -int r s_rr dr with s_rr = w(r) - w(r1), w = (k^2 r^2 + 1/(k^2
     r^2))/2."""
     r1, r2 = flexure_radii(k)
@@ -77,14 +77,14 @@ def flexure_moment(k):
     return (k**2 * r1**2 + 1 / (k**2 * r1**2)) / 2 * (r2**2 - r1**2) / 2 - integral(r2) + integral(r1)
 
 
-def flexure_pressure(k, r):
+def flexure_pressure(k: float, r: float | np.ndarray) -> float | np.ndarray:
     """Multiplier p of mu/2 (J^(-2/3) I1 - 3) + p (J - 1) in that block: s_rr = 1/(k r)^2 - I1/3 + p."""
     r1 = flexure_radii(k)[0]
     hoop, radial, inner = (k * r) ** 2, 1 / (k * r) ** 2, (k * r1) ** 2
     return (hoop + radial - inner - 1 / inner) / 2 - radial + (hoop + radial + 1) / 3
 
 
-def elastica(EI, length, force, weight, moment):
+def elastica(EI: float, length: float, force: float, weight: float, moment: float) -> tuple[float, float]:
     """Tip (x, z) of an inextensible elastica clamped along x under a downward tip force (N), weight per
     length and tip moment."""
 

@@ -17,14 +17,14 @@ from pneunet.hifi.verification.following import body_system, displacement_at, fo
 PUBLISHED = 6.89
 
 
-def panel(X):
+def panel(X: np.ndarray) -> np.ndarray:
     """Where the vertices (n, 3) of the box 48 x 1 go: bricks grow from the clamped end and from both
     edges."""
     x, s, z = 48 * (X[:, 0] / 48) ** 1.5, 0.3 * X[:, 1] + 0.35 * (1 - np.cos(np.pi * X[:, 1])), X[:, 2]
     return np.stack([x, 44 * x / 48 + s * (44 - 28 * x / 48), z], axis=1)
 
 
-def rise(cells):
+def rise(cells: int) -> tuple[float, int]:
     """(rise of the upper corner in mm, dofs) of a layer of cells x cells x 1 bricks between two frictionless
     planes."""
     thickness = 48 / cells
@@ -38,7 +38,7 @@ def rise(cells):
     return float(u[1]), dofs
 
 
-def converged(coarse, middle, fine):
+def converged(coarse: float, middle: float, fine: float) -> float:
     """Limit of a sequence of values on meshes halved twice, at the order they show themselves
     (Richardson)."""
     ratio = (middle - coarse) / (fine - middle)

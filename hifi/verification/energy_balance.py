@@ -15,7 +15,7 @@ from pneunet.hifi.verification import reference_case
 PRESSURE = 0.02
 
 
-def balance(intervals=8):
+def balance(intervals: int = 8) -> tuple[list[tuple[int, float]], int]:
     """([(intervals, work of the pressure / stored energy - 1), coarsest rule first], dofs) of the shipped
     two-segment body."""
     design = read_design_file(reference_case.DATA / "reference.toml")

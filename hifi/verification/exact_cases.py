@@ -1,5 +1,7 @@
 """Cases with exact solutions: each a function of its mesh's resolution that returns a list of
-`Comparison`."""
+`ExactComparison`."""
+
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import root_scalar
@@ -10,7 +12,13 @@ from pneunet.hifi.fem.loads import EndLoad, Gravity, Pressure
 from pneunet.hifi.path.control import LoadControl, VolumeControl
 from pneunet.hifi.path.newton import Newton
 from pneunet.hifi.verification import bodies, closed_forms
-from pneunet.hifi.verification.following import Comparison, body_system, follow, from_all_ranks, solve_from
+from pneunet.hifi.verification.following import (
+    ExactComparison,
+    body_system,
+    follow,
+    from_all_ranks,
+    solve_from,
+)
 
 SYMMETRY = [Support(bodies.PLANE_X, 0), Support(bodies.PLANE_Y, 1), Support(bodies.PLANE_Z, 2)]
 SPHERE_PRESSURES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
@@ -20,7 +28,9 @@ CAPPED_PRESSURES = (0.1, 0.2, 0.3, 0.4, 0.5)
 FLEXURE_CURVATURES = (0.1, 0.25, 0.5, 1.0, 1.5)
 
 
-def sphere(folder, size=0.19):
+def sphere(
+    folder: Path, size: float = 0.19
+) -> tuple[list[ExactComparison], list[ExactComparison], list[int]]:
     """(radii at given pressures, pressures at given radii up to and past the limit, unstable directions at
     the latter).
 
@@ -42,11 +52,13 @@ def sphere(folder, size=0.19):
     told = f"h = {size:g} r", system.problem.dofs
     system.destroy()
     rows = [
-        Comparison("sphere", f"a at P = {P}", *told, closed_forms.sphere_radius(P), a)
+        ExactComparison("sphere", f"a at P = {P}", *told, closed_forms.sphere_radius(P), a)
         for P, a in zip(SPHERE_PRESSURES, radii)
     ]
     beyond = [
-        Comparison("sphere, volume control", f"P at a = {a:g}", *told, closed_forms.sphere_pressure(a), P)
+        ExactComparison(
+            "sphere, volume control", f"P at a = {a:g}", *told, closed_forms.sphere_pressure(a), P
+        )
         for a, (P, _) in zip(PAST_LIMIT_RADII, past)
     ]
     return rows, beyond, [unstable for _, unstable in past]
@@ -73,18 +85,18 @@ class _Tube:
         return 4 * self.system.problem.reaction(bodies.END)[0][0]
 
 
-def tube(folder, size=0.25):
+def tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
     """Inner radii of the tube held at its length."""
     held = _Tube(folder, size)
     radii = follow(held.system, TUBE_PRESSURES, held.radius)
     held.system.destroy()
     return [
-        Comparison("tube, lambda_z = 1", f"a at P = {P}", *held.told, closed_forms.tube_radius(P), a)
+        ExactComparison("tube, lambda_z = 1", f"a at P = {P}", *held.told, closed_forms.tube_radius(P), a)
         for P, a in zip(TUBE_PRESSURES, radii)
     ]
 
 
-def capped_tube(folder, size=0.25):
+def capped_tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
     """Inner radii and stretches of the tube whose axial force is the thrust P pi a^2 on its far caps."""
     held = _Tube(folder, size)
     system, rows = held.system, []
@@ -102,13 +114,17 @@ def capped_tube(folder, size=0.25):
         ).root
         missing_thrust(stretch, P)
         a, exact_stretch = closed_forms.capped_tube(P)
-        rows.append(Comparison("capped tube", f"a at P = {P}", *held.told, a, held.radius()))
-        rows.append(Comparison("capped tube", f"lambda_z at P = {P}", *held.told, exact_stretch, stretch))
+        rows.append(ExactComparison("capped tube", f"a at P = {P}", *held.told, a, held.radius()))
+        rows.append(
+            ExactComparison("capped tube", f"lambda_z at P = {P}", *held.told, exact_stretch, stretch)
+        )
     system.destroy()
     return rows
 
 
-def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
+def torsion(
+    folder: Path, size: float = 0.3, stretch: float = 1.2, twist: float = 0.5
+) -> tuple[list[ExactComparison], float]:
     """(torque and axial force of a stretched and twisted cylinder, largest error of its displacements in
     mm)."""
 
@@ -130,13 +146,15 @@ def torsion(folder, size=0.3, stretch=1.2, twist=0.5):
     torque, axial = closed_forms.torsion(stretch, twist)
     at = f"at lambda = {stretch:g}, psi = {twist:g}"
     rows = [
-        Comparison("torsion of a solid cylinder", f"torque {at}", *told, torque, moment[0]),
-        Comparison("torsion of a solid cylinder", f"axial force {at}", *told, axial, force[0]),
+        ExactComparison("torsion of a solid cylinder", f"torque {at}", *told, torque, moment[0]),
+        ExactComparison("torsion of a solid cylinder", f"axial force {at}", *told, axial, force[0]),
     ]
     return rows, float(np.abs(u - motion(X, 1.0)).max())
 
 
-def flexure(cells=(4, 16), length=0.3, thickness=0.07):
+def flexure(
+    cells: tuple[int, int] = (4, 16), length: float = 0.3, thickness: float = 0.07
+) -> list[ExactComparison]:
     """Moments of a block of height 1 bent in plane strain: rollers in the middle, an end section that turns
     as it should.
 
@@ -168,9 +186,8 @@ def flexure(cells=(4, 16), length=0.3, thickness=0.07):
         )
         centre = (0.0, -closed_forms.flexure_radii(k)[0], 0.0)
         M = -system.problem.reaction(bodies.END, centre)[1][2] / thickness
-        rows.append(
-            Comparison("plane-strain flexure", f"M at k = {k:g}", *told, closed_forms.flexure_moment(k), M)
-        )
+        exact = closed_forms.flexure_moment(k)
+        rows.append(ExactComparison("plane-strain flexure", f"M at k = {k:g}", *told, exact, M))
     system.destroy()
     return rows
 
@@ -188,7 +205,7 @@ STRIP_LOADS = {
 }
 
 
-def cantilever(name, cells=(60, 2, 2)):
+def cantilever(name: str, cells: tuple[int, int, int] = (60, 2, 2)) -> tuple[np.ndarray, np.ndarray]:
     """(tip (x, z) of a strip under one of STRIP_LOADS, that of the elastica with E = 3 mu and I = w
     h^3/12)."""
     length, width, height = STRIP

@@ -6,12 +6,15 @@ F^-T have no divergence, the body force is -(mu lap u + F^-T grad q). A unit cub
 displacement but for x = 1, where the traction P N acts.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import ufl
 
 from pneunet.hifi.body.problem import Support
 from pneunet.hifi.fem import compat
-from pneunet.hifi.fem.loads import Load
+from pneunet.hifi.fem.loads import AppliedLoad
 from pneunet.hifi.fem.mixed_field import MixedField
 from pneunet.hifi.verification import bodies
 from pneunet.hifi.verification.following import body_system, solve_from
@@ -19,25 +22,25 @@ from pneunet.hifi.verification.following import body_system, solve_from
 AMPLITUDE = 0.15
 
 
-def displacement(X, sin, cos):
+def displacement(X: Any, sin: Callable, cos: Callable) -> tuple:
     """Components of u at X, for arrays or symbols."""
     x = X[0] + AMPLITUDE * sin(2 * X[1] + X[2])
     return x - X[0], 0 * X[1], AMPLITUDE * cos(2 * x + X[1])
 
 
-def shifted_pressure(X, sin, cos):
+def shifted_pressure(X: Any, sin: Callable, cos: Callable) -> Any:
     """q = p - mu I1/3 at X."""
     return sin(2 * X[0] + X[2]) * cos(2 * X[1])
 
 
-def exact(X):
+def exact(X: ufl.core.expr.Expr) -> tuple:
     """(u, F, q, p) as functions of the symbol X."""
     u = ufl.as_vector(displacement(X, ufl.sin, ufl.cos))
     F, q = ufl.Identity(3) + ufl.grad(u), shifted_pressure(X, ufl.sin, ufl.cos)
     return u, F, q, q + ufl.inner(F, F) / 3
 
 
-class Exact(Load):
+class Exact(AppliedLoad):
     """The force in the body and the traction on its face x = 1 that the exact deformation needs."""
 
     def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
@@ -51,11 +54,11 @@ class Exact(Load):
         ]
 
 
-def motion(X, load=1.0):
+def motion(X: np.ndarray, load: float = 1.0) -> np.ndarray:
     return np.stack(displacement(X.T, np.sin, np.cos), axis=1)
 
 
-def errors(cells):
+def errors(cells: int) -> tuple[float, float, int]:
     """(L2 error of u in mm^(5/2), of p in MPa mm^(3/2), dofs) on cells^3 bricks, starting from the
     interpolant."""
     faces = (bodies.PLANE_X, bodies.PLANE_Y, bodies.END_Y, bodies.PLANE_Z, bodies.END_Z)
@@ -73,6 +76,6 @@ def errors(cells):
     return *found, dofs
 
 
-def orders(coarse, fine, ratio=2.0):
+def orders(coarse: tuple, fine: tuple, ratio: float = 2.0) -> tuple[float, ...]:
     """Observed orders of u and p between two results of `errors`."""
     return tuple(float(np.log(a / b) / np.log(ratio)) for a, b in zip(coarse[:2], fine[:2]))

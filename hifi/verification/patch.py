@@ -12,7 +12,7 @@ from pneunet.hifi.verification.following import body_system, follow, largest
 SIDES = (bodies.PLANE_X, bodies.END, bodies.PLANE_Y, bodies.END_Y)
 
 
-def distorted(X):
+def distorted(X: np.ndarray) -> np.ndarray:
     """Vertices (n, 3) of the unit cube, inner ones moved by up to a tenth; faces stay plane."""
     bubble = (4 * X * (1 - X)).prod(axis=1, keepdims=True)
     return (
@@ -23,13 +23,13 @@ def distorted(X):
     )
 
 
-def gradient(load):
+def gradient(load: float) -> np.ndarray:
     """F of a plane isochoric stretch and shear in x and y with a stretch in z."""
     a, c, b = 1 + 0.3 * load, 1 - 0.1 * load, 0.4 * load
     return np.array([[a, b, 0.0], [0.0, c, 0.0], [0.0, 0.0, 1 / (a * c)]])
 
 
-def affine(pressure=0.2):
+def affine(pressure: float = 0.2) -> tuple[float, float]:
     """Largest errors (of u in mm, of p in MPa): four sides held affinely, rollers below, follower pressure on
     top.
 
@@ -63,7 +63,7 @@ def affine(pressure=0.2):
     return errors
 
 
-def squeezed(pressure=0.5):
+def squeezed(pressure: float = 0.5) -> tuple[float, float]:
     """Largest (u in mm, error of p in MPa) of an incompressible cube on three rollers under pressure on its
     other faces."""
     supports = [Support(tag, i) for i, tag in enumerate((bodies.PLANE_X, bodies.PLANE_Y, bodies.PLANE_Z))]

@@ -7,6 +7,7 @@ meshes, turned, do not match.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from dolfinx.mesh import meshtags
@@ -15,10 +16,11 @@ from scipy.optimize import brentq
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.hifi.cell.problem import CellProblem
-from pneunet.hifi.contact.penalty import WallPenalty
+from pneunet.hifi.cell.system import CellState
+from pneunet.hifi.contact.penalty import PenaltyLaw, WallPenalty
 from pneunet.hifi.verification import bodies
 from pneunet.hifi.verification.cells import held_at
-from pneunet.hifi.verification.following import Comparison
+from pneunet.hifi.verification.following import ExactComparison
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,11 @@ class Row:
     cot: float = 0.0
 
     @property
-    def pitch(self):
+    def pitch(self) -> float:
         return 1.0 + self.gap
 
 
-def exact_force(row, stretch, law):
+def exact_force(row: Row, stretch: float, law: PenaltyLaw) -> float:
     """Axial force (N, tension positive) of the row at this stretch of a pitch, the penalty's overlap
     included."""
 
@@ -52,8 +54,10 @@ def exact_force(row, stretch, law):
     return float(np.pi * stress(brentq(unbalanced, 0.2, 1.0, xtol=1e-14)))
 
 
-def pressed(folder, size=0.35, stretch=0.8, twist=0.25):
-    """(Comparison of the axial force, torque in N mm, CellState)."""
+def pressed(
+    folder: Path, size: float = 0.35, stretch: float = 0.8, twist: float = 0.25
+) -> tuple[ExactComparison, float, CellState]:
+    """(ExactComparison of the axial force, torque in N mm, CellState)."""
     row, penalty = Row(), WallPenalty()
     mesh, cells, facets = bodies.round_body(folder, "cylinder", size, tags.BODY)
     ends = np.isin(facets.values, (bodies.PLANE_X, bodies.END))
@@ -67,4 +71,4 @@ def pressed(folder, size=0.35, stretch=0.8, twist=0.25):
         problem.unknowns,
     )
     exact = exact_force(row, stretch, penalty.on(row.material.mu, row.gap))
-    return Comparison(*told, exact, state.force[0]), float(state.moment[0]), state
+    return ExactComparison(*told, exact, state.force[0]), float(state.moment[0]), state

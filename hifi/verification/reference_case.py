@@ -12,7 +12,7 @@ from pathlib import Path
 DATA = Path(__file__).resolve().parent / "data"
 
 
-def numbers():
+def numbers() -> dict[str, float]:
     """{name: number} of the converged state at 20 kPa; the same on all ranks."""
     from pneunet.geometry.designfile import read_design_file
     from pneunet.hifi.body.manipulator import ManipulatorSolve
@@ -37,7 +37,7 @@ def numbers():
     return out
 
 
-def on_ranks(ranks, path):
+def on_ranks(ranks: int, path: Path) -> dict[str, float]:
     """`numbers()` of a run on so many ranks, started as a user would; `path` is where it leaves them."""
     python = sys.executable
     command = [
@@ -57,14 +57,14 @@ def on_ranks(ranks, path):
     return json.loads(Path(path).read_text())
 
 
-def largest_difference(one, two):
+def largest_difference(one: dict[str, float], two: dict[str, float]) -> float:
     """Largest difference of two results, relative to the larger of a value and 1 (0.01 for curvatures,
     1/mm)."""
     scale = {name: 0.01 if "per_mm" in name else 1.0 for name in one}
     return max(abs(two[name] - value) / max(abs(value), scale[name]) for name, value in one.items())
 
 
-def main(path):
+def main(path: str) -> None:
     from mpi4py import MPI
 
     result = numbers()

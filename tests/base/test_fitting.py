@@ -10,6 +10,7 @@ from pneunet.base.materials.fitting import TensileData, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
 from pneunet.base.materials.laws import LAWS, Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh, material_from_table
 from pneunet.base.materials.tensile import Specimen, read_tensile
+from tests.toy_law import Demiray
 
 
 def measured(material, largest=3.0, noise=0.0, points=150):
@@ -41,6 +42,13 @@ def test_parameters_come_back_through_noise(material):
     assert nominal_stress(noisy, "uniaxial", l) == pytest.approx(
         nominal_stress(material, "uniaxial", l), rel=0.02
     )
+
+
+def test_a_new_law_is_fitted_too(monkeypatch):
+    material = Demiray(0.2, 0.08)
+    monkeypatch.setitem(LAWS, material.law, Demiray)
+    found = fit(material.law, TensileData([measured(material)])).material
+    assert (found.mu, found.b) == pytest.approx((0.2, 0.08), rel=1e-3)
 
 
 def warnings(law, *specimens, **options):

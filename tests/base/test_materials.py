@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
-from pneunet.base.materials.hyperelastic import MODES, nominal_stress, shear_stress, stable_stretch
+from pneunet.base.materials.hyperelastic import MODES, nominal_stress, shear_stress, slopes, stable_stretch
 from pneunet.base.materials.laws import (
+    Arrays,
     Gent,
     MooneyRivlin,
     NeoHookean,
@@ -20,6 +21,7 @@ from pneunet.base.materials.laws import (
     silicone,
 )
 from pneunet.base.materials.silicones import BULLETINS
+from tests.toy_law import Demiray, demiray_stress
 
 LAWS = [
     NeoHookean(0.3, elongation_at_break=4.0),
@@ -108,6 +110,55 @@ UNIAXIAL, EQUIBIAXIAL, SHEAR = 2 - 1 / 4, 2 - 1 / 32, 2 - 1 / 8
 def test_responses_at_stretch_2(material, expected):
     found = [nominal_stress(material, mode, 2.0) for mode in MODES] + [shear_stress(material, 1.5)]
     assert found == pytest.approx(expected, rel=1e-12)
+
+
+def closed_slopes(material, l):
+    """l dW/dl by hand; (..., 3) stretches."""
+    squares = l * l
+    I1 = squares.sum(-1, keepdims=True)
+    match material:
+        case NeoHookean(mu=mu):
+            return mu * squares
+        case MooneyRivlin(c10=c10, c01=c01):
+            return 2 * (c10 * squares - c01 / squares)
+        case Yeoh(c10=c10, c20=c20, c30=c30):
+            return 2 * (c10 + 2 * c20 * (I1 - 3) + 3 * c30 * (I1 - 3) ** 2) * squares
+        case Gent(mu=mu, jm=jm):
+            return mu * squares / (1 - (I1 - 3) / jm)
+    return sum(2 * mu / alpha * l**alpha for mu, alpha in material.terms)
+
+
+@pytest.mark.parametrize("material", LAWS, ids=by_law)
+def test_slopes_are_exact(material):
+    """Of the energy that is written once, against derivatives by hand."""
+    e = np.random.default_rng(2).uniform(-0.6, 0.6, (40, 3))
+    l = np.exp(e - e.mean(axis=1, keepdims=True))
+    exact = closed_slopes(material, l)
+    assert slopes(material, l) == pytest.approx(exact, rel=1e-12, abs=1e-13 * material.mu)
+    stretch = np.linspace(0.4, 3.0, 27)
+    for mode, stretches in MODES.items():
+        s = closed_slopes(material, stretches(stretch))
+        known = np.linalg.norm(stretches(stretch), axis=1) ** 2 - 3 < getattr(material, "jm", inf)
+        stress = np.where(known, (s[:, 0] - s[:, 2]) / stretch, np.nan)
+        assert nominal_stress(material, mode, stretch) == pytest.approx(stress, rel=1e-11, nan_ok=True)
+
+
+def test_ogden_s_two_energies_are_one():
+    """Of principal stretches, and the series in the invariants that finite elements take."""
+    material = LAWS[4]
+    l = MODES["equibiaxial"](np.linspace(0.5, 3.0, 26))
+    squares = l.astype(complex) ** 2
+    series = material.energy(squares.sum(-1), (1 / squares).sum(-1), Arrays)
+    assert series.real == pytest.approx(material.of_stretches(l), rel=1e-7)
+
+
+def test_a_new_law_is_one_class():
+    """Nothing but its energy is written down (tests/hifi/test_materials.py has it in finite elements)."""
+    material, l = Demiray(0.3, 0.1), np.linspace(0.5, 4.0, 36)
+    assert nominal_stress(material, "uniaxial", l) == pytest.approx(demiray_stress(material, l), rel=1e-12)
+    assert [stable_stretch(material, mode) for mode in MODES] == [inf] * 3
+    with pytest.raises(InputError, match="mu_MPa = -1 must be larger than 0"):
+        Demiray(-1.0, 0.1)
 
 
 def test_stability():

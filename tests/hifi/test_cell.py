@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.integrate import simpson
 
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.materials.laws import NeoHookean
@@ -44,12 +45,9 @@ def held(segment, path, pressure, strains):
     return np.concatenate([state.force, state.moment])
 
 
-def follow(system, target, size):
-    run_steps(
-        EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)),
-        target,
-        size,
-    )
+def follow(system, target, size, on_load=lambda load: None):
+    path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    run_steps(path, target, size, lambda step: on_load(step.load))
 
 
 @pytest.fixture
@@ -97,6 +95,24 @@ def test_a_stiff_bottom_layer_keeps_its_length(one_sided, tmp_path):
         cell.destroy()
     assert stretches[0] < 0.99  # the soft base is compressed by the bending
     assert stretches[1] == pytest.approx(1.0, abs=2e-3)
+
+
+def test_the_work_of_the_pressure_is_stored_in_the_body_and_its_bottom_layer(one_sided, tmp_path):
+    """P V - int V dP by Simpson's rule, at equal steps of the pressure."""
+    layered = replace(one_sided, layer_thickness=0.5, layer_material=NeoHookean(0.6))
+    mesh_cell(layered, 4.0, tmp_path / "cell.msh")
+    system, pressures = CellSystem(CellProblem(layered, tmp_path / "cell.msh")), np.linspace(0, 0.02, 9)
+    volume, rest = {0.0: system.volume()}, system.problem.stored_energy()
+    marks = tuple(pressures[1:])
+    follow(
+        system,
+        0.02,
+        StepSize(0.0025, 1e-4, milestones=marks),
+        lambda load: volume.update({load: system.volume()}),
+    )
+    work = 0.02 * volume[0.02] - simpson([volume[P] for P in pressures], x=pressures)
+    assert system.problem.stored_energy() - rest == pytest.approx(work, rel=1e-5)
+    system.destroy()
 
 
 def test_twisting_cell_only_twists(tmp_path):

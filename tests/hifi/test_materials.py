@@ -3,17 +3,13 @@ a unit cube."""
 
 import numpy as np
 import pytest
-import ufl
-from dolfinx import fem
-from dolfinx.mesh import create_unit_cube
-from mpi4py import MPI
-from petsc4py import PETSc
 from scipy.optimize import fsolve
 
 from pneunet.base.materials.hyperelastic import MODES, nominal_stress, shear_stress, slopes
 from pneunet.base.materials.laws import Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh
-from pneunet.hifi.fem import compat
-from pneunet.hifi.fem.materials import energy_density
+from pneunet.hifi.body.problem import BodyProblem
+from pneunet.hifi.verification import bodies
+from tests.toy_law import Demiray
 
 LAWS = [
     NeoHookean(0.3),
@@ -21,57 +17,37 @@ LAWS = [
     Yeoh(0.1, -1e-3, 2e-4),
     Gent(0.3, 20.0),
     Ogden(0.2, 1.3, 0.004, 5.0, 0.03, -2.0),
+    Demiray(0.3, 0.1),
 ]
 
 
 class Cube:
-    """Residual and tangent of one material on a unit cube, as functions of a displacement gradient and a
+    """Residual and tangent of one material on a free unit cube, as functions of a displacement gradient and a
     pressure."""
 
     def __init__(self, material):
-        self.material, comm = material, MPI.COMM_WORLD
-        mesh = create_unit_cube(comm, 1, 1, 1)
-        self.space = compat.mixed_space(mesh)
-        self.state = fem.Function(self.space)
-        displacements, to_mixed = self.space.sub(0).collapse()
-        self.dofs = np.asarray(to_mixed).reshape(-1, 3)
-        self.X = displacements.tabulate_dof_coordinates()[: len(self.dofs)]
-        self.pressure_dofs = np.asarray(self.space.sub(1).collapse()[1])
-        u, p = ufl.split(self.state)
-        dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2})
-        energy = energy_density(mesh, material, ufl.Identity(3) + ufl.grad(u), p) * dx
-        residual = ufl.derivative(energy, self.state)
-        self._energy, self._residual = compat.compile_form(energy), compat.compile_form(residual)
-        self._tangent = compat.compile_form(ufl.derivative(residual, self.state))
-        self.comm = comm
+        self.material = material
+        self.problem = BodyProblem(*bodies.box((1.0, 1.0, 1.0), (1, 1, 1)), material, [])
+        self.energy = self.problem.stored_energy
 
     def field(self, H, p=0.0):
         """Array of the mixed space with displacement H X and pressure p."""
-        array = np.zeros(len(self.state.x.array))
-        array[self.dofs] = self.X @ np.asarray(H).T
-        array[self.pressure_dofs] = p
+        array = np.zeros(len(self.problem.array))
+        array[self.problem.displacement_dofs] = self.problem.nodes @ np.asarray(H).T
+        array[self.problem.pressure_dofs] = p
         return array
 
     def set(self, F, p):
-        self.state.x.array[:] = self.field(np.asarray(F) - np.eye(3), p)
-
-    def energy(self):
-        return self.comm.allreduce(fem.assemble_scalar(self._energy), MPI.SUM)
-
-    def residual(self):
-        r = fem.petsc.assemble_vector(self._residual)
-        r.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return r
+        self.problem.set_array(self.field(np.asarray(F) - np.eye(3), p))
 
     def work(self, H, p=0.0):
         """dPi of the variation H X of the displacement and p of the pressure."""
-        r = self.residual()
-        return self.comm.allreduce(r.array @ self.field(H, p)[: len(r.array)], MPI.SUM)
+        r, _ = self.problem.residual()
+        return self.problem.total(r @ self.field(H, p)[: len(r)])
 
     def stiffness(self, H):
         """d2Pi along H X, twice."""
-        A = fem.petsc.assemble_matrix(self._tangent)
-        A.assemble()
+        A = self.problem.assemble_tangent(self.problem.create_tangent())
         x, y = A.createVecs()
         x.array[:] = self.field(H)[: len(x.array)]
         A.mult(x, y)
