@@ -1,7 +1,7 @@
 """`python -m examples.idea`: the README's picture of the idea, docs/idea.png: cell -> law -> rod -> body.
 
-The cell and the law are of the reference case one-sided-w10, rod and body of the demo (`make demo` first; without
-its solution the body is the reduced model's outline).
+The cell and the law are of the reference case one-sided-w10, rod and body are the demo's (`make demo` first;
+without its solution the body is the reduced model's outline).
 """
 
 import subprocess
@@ -27,7 +27,10 @@ ANGLE, TOP_kPa, LEVELS, MESH_SIZE, PITCHES = 60.0, 50.0, 5, 1.0, 4
 #: what a quadratic facet (corners, mid-edges) is drawn as
 FLAT = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
 WIDE, PIXELS = (14.0, 4.1), (840, 720)
-MAP = "viridis"
+MAP = "YlOrRd"
+EDGES = {"color": "#3b434b", "line_width": 2.5, "lighting": False}
+#: so that colours stay those of the bar
+LIT = {"ambient": 0.6, "diffuse": 0.5}
 
 
 def solved_cell(segment):
@@ -65,11 +68,16 @@ def cell_surface(problem, state):
 
 
 def in_place(surface):
-    """Things to render: a surface from `cell_surface` where it has moved to, with the edges it has at rest."""
-    lines, look = edges(surface)
+    """(surface, edges) of a `cell_surface` where it has moved to, edges as they are at rest."""
+    lines, _ = edges(surface)
     for mesh in (surface, lines):
         mesh.points = np.asarray(mesh.point_data["place"])
-    return surface, lines, look
+    return surface, lines
+
+
+def lit(surface, name, limits):
+    mesh, look = coloured(surface, name, limits, MAP)
+    return mesh, look | LIT
 
 
 def demo_design():
@@ -103,9 +111,7 @@ def draw_law(axes, segment, states, law):
         axes.plot(*np.transpose(dots), "o", color=FINITE_ELEMENTS, markersize=5, zorder=3, clip_on=False)
     axes.plot([], [], "o", color=FINITE_ELEMENTS, markersize=5, label="cells, finite elements")
     axes.errorbar([], [], [], fmt="none", ecolor="0.4", capsize=3.5, label="90 % interval of the law")
-    axes.set(
-        xlabel="pressure, kPa", ylabel="strains of the section, rad/m", xlim=(0, TOP_kPa), ylim=(0, None)
-    )
+    axes.set(xlabel="pressure, kPa", ylabel="strains of the section, rad/m", xlim=(0, TOP_kPa), ylim=(0, 50))
     axes.xaxis.set_major_locator(MultipleLocator(10))
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=9, loc="upper left", borderaxespad=0.1, handlelength=1.4)
@@ -118,10 +124,12 @@ def section_frames(line, every, length):
     poses = line.at(np.arange(line.s[0], line.s[-1], every))
     for axis, colour in ((1, "#c92a2a"), (2, "#2b8a3e")):
         bars = [
-            pyvista.Cylinder(p[:3, 3] + length / 2 * p[:3, axis], p[:3, axis], 0.45, length).extract_surface()
+            pyvista.Cylinder(
+                center=p[:3, 3] + length / 2 * p[:3, axis], direction=p[:3, axis], radius=0.5, height=length
+            )
             for p in poses
         ]
-        yield pyvista.merge(bars), {"color": colour}
+        yield pyvista.merge(bars).extract_surface(), {"color": colour}
 
 
 def body(design, law):
@@ -130,18 +138,17 @@ def body(design, law):
     if not path.exists():
         mesh = body_mesh(design.manipulator, design.pressure, law, design.base_pose)
         return painted(mesh), mesh.points, "outline carried by the rod", None
-    surface, lines = deformed_surface(read_solution(path), design.base_pose)
-    top = float(surface.point_data["stretch"].max())
-    limits = (1.0, min(top, 1.0 + np.ceil(10 * (top - 1)) / 10))
-    return [coloured(surface, "stretch", limits, MAP), lines], surface.points, "finite elements", limits
+    surface, (lines, _) = deformed_surface(read_solution(path), design.base_pose)
+    limits = (1.0, float(np.percentile(surface.point_data["stretch"], 99)))
+    return [lit(surface, "stretch", limits), (lines, EDGES)], surface.points, "finite elements", limits
 
 
-def colour_bar(fig, place, limits, label):
+def colour_bar(fig, place, limits, label, extend="neither"):
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     axes = fig.add_axes(place)
-    fig.colorbar(ScalarMappable(Normalize(*limits), MAP), cax=axes, orientation="horizontal")
+    fig.colorbar(ScalarMappable(Normalize(*limits), MAP), cax=axes, orientation="horizontal", extend=extend)
     axes.set_xlabel(label, fontsize=9)
     axes.tick_params(labelsize=9)
 
@@ -153,48 +160,49 @@ def main():
     line = predict(design.manipulator, design.pressure, law, base_pose=design.base_pose)
     things, points, words, limits = body(design, law)
 
+    # base first, tip last: the camera looks across the way from one to the other
+    view = view_of(np.vstack([line.points[:1], points, line.points]), 1.15)
     fig = figure(*WIDE)
-    cell, lines, look = in_place(surface)
+    cell, lines = in_place(surface)
     moved = (0.0, float(np.asarray(cell.point_data["moved"]).max()))
     panels = [
         (
             "1  Cell",
             f"one pitch, repeated by its screw; {TOP_kPa:.0f} kPa",
-            view_of(cell.points),
-            [coloured(cell, "moved", moved, MAP), (lines, look)],
+            view_of(cell.points, 1.2),
+            [lit(cell, "moved", moved), (lines, EDGES)],
         ),
-        ("2  Law", "of the section's strains", None, None),
+        ("2  Law", f"strains over pressure; one-sided, {ANGLE:.0f}°", None, None),
         (
             "3  Rod",
-            f"centreline by the law; {1e3 * design.pressure:.0f} kPa",
-            view_of(points),
+            f"the demo's centreline by the law; {1e3 * design.pressure:.0f} kPa",
+            view,
             [tube(line.points, 1.0, REDUCED), *section_frames(line, 8.0, 9.0)],
         ),
-        ("4  Body", f"{words}; {1e3 * design.pressure:.0f} kPa", view_of(points), things),
+        ("4  Body", f"{words}; {1e3 * design.pressure:.0f} kPa", view, things),
     ]
-    for number, (title, text, view, shown) in enumerate(panels):
+    for number, (title, text, seen, shown) in enumerate(panels):
         left = 0.012 + 0.25 * number
         fig.text(left, 0.955, title, fontsize=15, weight="bold", va="top")
         fig.text(left, 0.875, text, fontsize=10, color="0.3", va="top")
-        if view is None:
+        if seen is None:
             draw_law(fig.add_axes([left + 0.035, 0.235, 0.175, 0.565]), segment, states, law)
             continue
         axes = fig.add_axes([left - 0.01, 0.2, 0.235, 0.64])
-        axes.imshow(render(view, shown, PIXELS))
+        axes.imshow(render(seen, shown, PIXELS))
         axes.set_axis_off()
-        scale_bar(axes, view)
+        scale_bar(axes, seen)
     for number in range(3):
         fig.text(
             0.25 * (number + 1) - 0.012, 0.52, "\u279c", fontsize=24, color="0.35", ha="center", va="center"
         )
     colour_bar(fig, [0.04, 0.15, 0.16, 0.03], moved, "displacement in the section frame, mm")
     if limits:
-        colour_bar(fig, [0.79, 0.15, 0.16, 0.03], limits, "largest principal stretch")
+        colour_bar(fig, [0.79, 0.15, 0.16, 0.03], limits, "largest principal stretch", "max")
     fig.text(
         0.6, 0.13, "bars: section frames, across (red)\nand up (green)", fontsize=9, ha="center", va="center"
     )
     save(fig, PICTURE, dpi=110)
-    shrink(PICTURE)
     print(f"idea: {PICTURE}, {PICTURE.stat().st_size / 1000:.0f} kB")
 
 
@@ -205,13 +213,6 @@ def scale_bar(axes, view, share=0.2):
     right, low = PIXELS[0] - 25, PIXELS[1] - 18
     axes.plot([right - length / per_pixel, right], [low, low], color="black", linewidth=2)
     axes.text(right - length / per_pixel / 2, low - 10, f"{length} mm", ha="center", va="bottom", fontsize=9)
-
-
-def shrink(path):
-    """At most 256 colours, so that the picture stays small."""
-    from PIL import Image
-
-    Image.open(path).convert("RGB").quantize(256).save(path, optimize=True)
 
 
 if __name__ == "__main__":
