@@ -18,6 +18,8 @@ DOTTED = re.compile(rf"{FREE}pneunet(?:\.\w+)+(?![\w/])")
 OLD = re.compile(
     rf"{FREE}(?:(?:base|geometry|hifi|reduced)\.[a-z]|design\.(?:run|shape|target|search|report)\.)\w+"
 )
+#: a name at the front door
+FRONT = re.compile(rf"{FREE}pn\.(\w+)")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.*)$", re.M)
 PYTHON = re.compile(r"^```python\n(.*?)^```", re.S | re.M)
@@ -65,7 +67,8 @@ def anchors(page):
 def test_what_a_page_names_exists(page):
     text = page.read_text()
     paths = {p for p in PATH.findall(text) if not any(ROOT.glob(p.rstrip("/")))}
-    dotted = {d for d in DOTTED.findall(text) if not exists(d)}
+    named = {*DOTTED.findall(text), *(f"pneunet.{n}" for n in FRONT.findall(text))}
+    dotted = {d for d in named if not exists(d)}
     modules = {m for m in COMMAND.findall(text) if m != "pytest" and not module_file(m)}
     assert (paths, dotted, modules, set(OLD.findall(text))) == (set(), set(), set(), set())
     targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.M)
