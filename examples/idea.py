@@ -13,6 +13,7 @@ import numpy as np
 
 from pneunet.base import se3
 from pneunet.base.pictures.rendering import coloured, edges, figure, render, save, view_of
+from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.design.report.bodies import body_mesh, deformed_surface, painted, read_solution, tube
 from pneunet.design.report.labels import FINITE_ELEMENTS, REDUCED
 from pneunet.geometry import tags
@@ -42,7 +43,7 @@ def solved_cell(segment):
     states = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.msh"
-        solve_cell(CellCase(segment, TOP_kPa * 1e-3, MESH_SIZE, LEVELS), path, states.append)
+        solve_cell(CellCase(segment, TOP_kPa * MPA_PER_KPA, MESH_SIZE, LEVELS), path, states.append)
         return cell_surface(CellProblem(segment, path), states[-1]), states
 
 
@@ -60,8 +61,7 @@ def cell_surface(problem, state):
         rest = problem.nodes[used] + [number * problem.segment.pitch, 0, 0]
         screw = se3.exp_pose(state.strains.twist_vector * rest[:, :1])
         moved = np.einsum("nij,nj->ni", screw[:, :3, :3], rest * [0, 1, 1] + bulge) + screw[:, :3, 3]
-        faces = np.column_stack([np.full(len(corners.reshape(-1, 3)), 3), corners.reshape(-1, 3)])
-        pitch = pyvista.PolyData(rest, faces.ravel())
+        pitch = pyvista.PolyData.from_regular_faces(rest, corners.reshape(-1, 3))
         pitch.point_data["place"], pitch.point_data["moved"] = moved, np.linalg.norm(bulge, axis=1)
         pitches.append(pitch)
     return pyvista.merge(pitches).extract_surface().clean(tolerance=1e-6, absolute=True)
@@ -94,7 +94,7 @@ def draw_law(axes, segment, states, law):
     from matplotlib.ticker import MultipleLocator
 
     section, pressures = law.of(segment), np.linspace(0.0, TOP_kPa, 21)
-    strains, half = section.free_strains(1e-3 * pressures), section.half_width(1e-3 * pressures)
+    strains, half = section.free_strains(MPA_PER_KPA * pressures), section.half_width(MPA_PER_KPA * pressures)
     for i, name, unit, colour in ((3, "twist", "$k_1$", REDUCED), (4, "bending", "$k_2$", "#2f9e44")):
         k = 1e3 * strains[:, i]
         axes.plot(pressures, k, color=colour, linewidth=2, label=f"{name} {unit}")
@@ -107,7 +107,7 @@ def draw_law(axes, segment, states, law):
             elinewidth=1.2,
             capsize=3.5,
         )
-        dots = [(1e3 * s.pressure, 1e3 * s.strains.k[i - 3]) for s in states]
+        dots = [(KPA_PER_MPA * s.pressure, 1e3 * s.strains.k[i - 3]) for s in states]
         axes.plot(*np.transpose(dots), "o", color=FINITE_ELEMENTS, markersize=5, zorder=3, clip_on=False)
     axes.plot([], [], "o", color=FINITE_ELEMENTS, markersize=5, label="cells, finite elements")
     axes.errorbar([], [], [], fmt="none", ecolor="0.4", capsize=3.5, label="90 % interval of the law")
@@ -175,11 +175,11 @@ def main():
         ("2  Law", f"strains over pressure; one-sided, {ANGLE:.0f}°", None, None),
         (
             "3  Rod",
-            f"the demo's centreline by the law; {1e3 * design.pressure:.0f} kPa",
+            f"the demo's centreline by the law; {KPA_PER_MPA * design.pressure:.0f} kPa",
             view,
             [tube(line.points, 1.0, REDUCED), *section_frames(line, 8.0, 9.0)],
         ),
-        ("4  Body", f"{words}; {1e3 * design.pressure:.0f} kPa", view, things),
+        ("4  Body", f"{words}; {KPA_PER_MPA * design.pressure:.0f} kPa", view, things),
     ]
     for number, (title, text, seen, shown) in enumerate(panels):
         left = 0.012 + 0.25 * number
