@@ -7,7 +7,7 @@ RANKS := 2
 export OMP_NUM_THREADS := 1
 export HWLOC_HIDE_ERRORS := 2
 
-.PHONY: help setup demo test types bench image image-test clean
+.PHONY: help setup demo test types bench idea image image-test clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
@@ -27,6 +27,9 @@ types: setup ## mypy and ruff
 
 bench: setup ## measure the figures (ONLY=part for one part)
 	$(VENV)/python -m benchmarks $(if $(ONLY),--only $(ONLY))
+
+idea: setup ## the README's picture of the idea (after `make demo`)
+	$(VENV)/python -m examples.idea
 
 image: ## container image `pneunet` (podman, docker or buildah)
 	@containers/build.sh

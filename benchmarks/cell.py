@@ -152,9 +152,9 @@ def unit_cell():
 STUDY = """\
 One-sided-w10, 60 degrees, mu = 0.2068 MPa, the section frame on the channel's axis. Graded meshes shrink
 to a fifth of their size at the body's edges, where stresses are singular. Their three sizes are in a
-constant ratio; the extrapolated values take the ratio of their differences, so that the order is
-observed, not assumed. Errors are norms of (e, k pitch) over that of the extrapolated strain, the larger
-of 20 and 50 kPa. Sweeps are 0 to 50 kPa with the stiffness at every level.""".splitlines()
+constant ratio. The extrapolated values take the ratio of their differences, so that the order is observed,
+not assumed. Errors are norms of (e, k pitch) over the norm of the extrapolated strain, the larger of 20 and
+50 kPa. Sweeps are 0 to 50 kPa with the stiffness at every level.""".splitlines()
 
 
 def section(details):
@@ -180,8 +180,9 @@ def section(details):
         f"Strains at 50 kPa. Observed orders: {orders[0]:.2f} at 20 kPa, {orders[1]:.2f} at 50 kPa.",
     ]
     lines += [
-        f"The same tetrahedra cut elsewhere: stiffness to {gauge['cut']:.0e}. The gauge on the cavity's"
-        " walls: screw compliance to "
+        "",
+        f"With the same tetrahedra cut elsewhere the stiffness agrees to {gauge['cut']:.0e}. With the gauge"
+        " on the cavity's walls the screw compliance agrees to ",
     ]
     lines[-1] += (
         f"{gauge['screw_compliance']:.0e}; single entries of the stiffness, which belong to the frame,"

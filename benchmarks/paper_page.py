@@ -23,7 +23,7 @@ from benchmarks.paper import (
 from benchmarks.tables import table
 
 PICTURE = "paper-models.png"
-WIDTH = 135
+WIDTH = 110
 SHOWN = "twist_w15"
 KPA = [round(p * 1e3) for p in PRESSURES]
 
@@ -32,10 +32,10 @@ TEXT = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())
 
 
 def _prose(text, **facts):
-    """Lines of a paragraph."""
-    return textwrap.wrap(
-        " ".join(text.format(**facts).split() if facts else text.split()), WIDTH, break_on_hyphens=False
-    )
+    """Lines of paragraphs."""
+    paragraphs = (text.format(**facts) if facts else text).strip().split("\n\n")
+    wrapped = [textwrap.wrap(" ".join(p.split()), WIDTH, break_on_hyphens=False) for p in paragraphs]
+    return [line for lines in wrapped for line in ["", *lines]][1:]
 
 
 def _case(name):

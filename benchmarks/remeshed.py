@@ -86,9 +86,10 @@ def percentiles(states, strains, K):
 def lines(details):
     """Lines of docs/rod-law.md."""
     text = (
-        "A mesh is one of many: 95th percentiles of the differences between cells on two meshes of nearly"
-        f" the same size, 2 and {MESH_SIZE:g} mm, beside those of the law against the first, for the same"
-        f" held-out designs (those below index {BELOW}); defined as the figures below."
+        "A mesh is one of many, and another of the same size gives other strains. The table has 95th"
+        f" percentiles of differences for the held-out designs below index {BELOW}: cells on two meshes of"
+        f" nearly the same size, 2 and {MESH_SIZE:g} mm, and the law against the cells at 2 mm. The errors"
+        " are defined as the figures below."
     )
     rows = [
         (f"{kind}, {found['designs']} designs", who, *[f"{found[who][name]:.2%}" for name in FIGURES])

@@ -74,9 +74,10 @@ def lines(details):
     head = ["design", "silicone", *[f"P/mu = {p:g}" for p in details["levels"]]]
     rows = [(r["design"], r["silicone"], *[f"{e:.1%}" for e in r["error"]]) for r in details["rows"]]
     text = (
-        "Free strains of unit cells of real silicones (Yeoh laws fitted to tensile tests of the Soft"
-        " Robotics Materials Database, Marechal et al. 2021, ODbL) against neo-Hookean ones of the same"
-        " initial modulus, which is what the law takes: norm of the difference of (e, k l) over that of the"
-        f" free strains, finite elements on both sides, h = {details['mesh_size_mm']:g} mm."
+        "The law takes the initial modulus of a material. The table has what that costs: free strains of unit"
+        " cells of real silicones (Yeoh laws fitted to tensile tests of the Soft Robotics Materials Database,"
+        " Marechal et al. 2021, ODbL) against neo-Hookean cells of the same initial modulus. It is the norm"
+        " of the difference of (e, k l) over the norm of the free strains, finite elements on both sides,"
+        f" h = {details['mesh_size_mm']:g} mm."
     )
     return ["## Other materials", "", text, "", *table(head, rows), ""]

@@ -188,23 +188,28 @@ def page(results, meta):
 
 
 ABOUT = """\
-Problem: case twist-w12 (60 degrees, three pairs of chambers), neo-Hookean, incompressible, P2/P1 on
+**Problem.** Case twist-w12 (60 degrees, three pairs of chambers), neo-Hookean, incompressible, P2/P1 on
 straight tetrahedra, clamped at its base, follower pressure 0 to 50 kPa, relative tolerance 1e-8 of the
-pressure load, quadrature of degree 4. All codes build the same vertices and cells; FElupe integrates with
+pressure load, quadrature of degree 4. All codes build the same vertices and cells. FElupe integrates with
 our rule, NGSolve with its own of 14 points.
 
-Solvers: pneunet MUMPS LDL^T on OpenBLAS; FElupe (numpy assembly by its own integral forms, a hand-written
-energy, only the upper triangle assembled into a fixed pattern) and NGSolve (an energy compiled to C++,
-symmetric storage) MKL PARDISO LDL^T with METIS, two-level factorisation and no iterative refinement, the
-fastest of the settings tried for both (pypardiso's defaults take a quarter longer for the ramp; NGSolve's
-sparsecholesky and UMFPACK take 1.6 and 2.8 times as long for a factorisation at h = 1 mm). One thread
-each.
+**Solvers.** One thread each, at the fastest of the settings tried
+([which](decisions.md#rivals-run-at-their-fastest-settings)):
 
-Strategies: *same*: steps to 2.5, 5, 10 .. 50 kPa, quadratic extrapolation, a new factorisation when an
-iteration lowers the residual by less than 3.3 times. *best*: `hifi`'s own stepping (its factorisations
-include the tangent's assembly). *stock*: full Newton without predictor in steps of 2.5 kPa, the largest
-that arrive. Timed is the ramp: assembly, symbolic and numeric factorisation, solutions and updates, not
-meshing, imports, compilation and sparsity patterns.""".splitlines()
+- pneunet: MUMPS LDL^T on OpenBLAS;
+- FElupe: numpy assembly by its own integral forms, a hand-written energy, only the upper triangle assembled
+  into a fixed pattern; MKL PARDISO LDL^T with METIS, two-level factorisation, no iterative refinement;
+- NGSolve: an energy compiled to C++, symmetric storage; the same MKL PARDISO.
+
+**Strategies.**
+
+- *same*: steps to 2.5, 5, 10 .. 50 kPa, quadratic extrapolation, a new factorisation when an iteration
+  lowers the residual by less than 3.3 times;
+- *best*: `hifi`'s own stepping (its factorisations include the tangent's assembly);
+- *stock*: full Newton without predictor in steps of 2.5 kPa, the largest that arrive.
+
+Timed is the ramp: assembly, symbolic and numeric factorisation, solutions and updates. Meshing, imports,
+compilation and sparsity patterns are not timed.""".splitlines()
 RAMP_FIGURES = {
     "ramp_ratio_same_strategy_h2": "same strategy, h = 2 mm, ours over the faster of theirs",
     "ramp_ratio_same_strategy_h1": "same strategy, h = 1 mm",

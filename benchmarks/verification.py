@@ -82,33 +82,36 @@ def verification():
 
 #: what of the page's text cannot be computed
 ABOUT = """\
-Every number is from the P2/P1 mixed elements of `hifi`, mu = 1 MPa, mm and MPa; meshes are stated, dofs
-count u and p. Run `make bench ONLY=verification` for all of it, `python -m pytest tests/verification` for
-the same cases on the cheapest meshes that meet the bars.""".splitlines()
+Every number is from the P2/P1 mixed elements of `hifi`, mu = 1 MPa, mm and MPa. Meshes are stated; dofs
+count u and p. `make bench ONLY=verification` runs all of it, `python -m pytest tests/verification` the same
+cases on the cheapest meshes that meet the bars.""".splitlines()
 EXACT = """\
-Sphere, tube and cylinder have second-order geometry, radii 1 and 2 (the solid cylinder's 1); *h* is the
-edge length, *r* the distance from the centre or axis. The sphere is an octant: pressure control to P =
-0.8, from there volume control through the limit point. The tube is a quarter of a slice between two
-planes; capped, the far plane is put where its force is the thrust P pi a^2. Torsion: both end sections
-held as the exact solution has them, force and moment are reactions. Flexure: rollers in the middle, the
-end section turned; at k = 1.5 the inner face is shortened to 0.55, where a half-space wrinkles, so each
-state is found from the interpolant of the exact one (Newton's method does not mind that the factorised
-tangent has unstable directions there). *cell*: the same two as unit cells of the screw-periodic
-formulation at prescribed strains; force and moment are its section force and moment.""".splitlines()
+Sphere, tube and cylinder have second-order geometry, radii 1 and 2 (the solid cylinder's 1). *h* is the
+edge length, *r* the distance from the centre or axis.
+
+- *Sphere*: an octant. Pressure control to P = 0.8, from there volume control through the limit point.
+- *Tube*: a quarter of a slice between two planes. For the capped tube the far plane is put where its force
+  is the thrust P pi a^2.
+- *Torsion*: both end sections are held as the exact solution has them; force and moment are reactions.
+- *Flexure*: rollers in the middle, the end section turned. At k = 1.5 the inner face is shortened to 0.55,
+  where a half-space wrinkles. So each state is found from the interpolant of the exact one (Newton's
+  method does not mind that the factorised tangent has unstable directions there).
+- *cell*: torsion and flexure as unit cells of the screw-periodic formulation at prescribed strains; force
+  and moment are its section force and moment.""".splitlines()
 LAND = """\
-Land et al. 2015, problem 1: a law of its own (exponential, fibres along x), follower pressure on an open
-face (unsymmetric tangent, LU). Deformed z of the point (10, 0.5, 1); the codes of that paper lie within
-4.15 to 4.19 mm.""".splitlines()
+Land et al. 2015, problem 1: a law of its own (exponential, fibres along x) and a follower pressure on an
+open face (unsymmetric tangent, LU). The table has the deformed z of the point (10, 0.5, 1). The codes of
+that paper lie within 4.15 to 4.19 mm.""".splitlines()
 COOK = """\
-Plane strain, G = 80.1938 and K = 400942 MPa, 100 N per mm of thickness; bricks are graded to the clamped
+Plane strain, G = 80.1938 and K = 400942 MPa, 100 N per mm of thickness. Bricks are graded to the clamped
 end and the edges. The converged value is extrapolated from the last three meshes at the order that they
 show.""".splitlines()
 MANUFACTURED = """\
-Unit cube, isochoric finite shears, body force and the traction on one face derived by hand; L2 errors,
-orders from one mesh to the next (bars: 2.8 for u, 1.8 for p).""".splitlines()
+Unit cube, isochoric finite shears, body force and the traction on one face derived by hand. The table has
+L2 errors, and orders from one mesh to the next (bars: 2.8 for u, 1.8 for p).""".splitlines()
 ENERGY = """\
 The shipped two-segment body to 20 kPa: work of the pressure by Simpson's rule against the stored energy.
-The rule's own error falls 16 times when its step is halved; bar 1e-5 on the finest.""".splitlines()
+The rule's own error falls 16 times when its step is halved. Bar: 1e-5 on the finest one.""".splitlines()
 PICTURES = {
     "verification-inflation.png": "Pressure over inner radius: exact curves, computed states",
     "verification-convergence.png": "Manufactured solution, Land's beam and Cook's membrane over the mesh",
