@@ -1,6 +1,7 @@
 """Serial and MPI runs alike: release PETSc objects and keep ranks together between tests."""
 
 import gc
+import logging
 import os
 import sys
 from pathlib import Path
@@ -21,6 +22,15 @@ def release_between_tests(request):
 
         gc.collect()
         MPI.COMM_WORLD.barrier()
+
+
+@pytest.fixture(autouse=True)
+def nothing_on_the_screen():
+    """Tests share a process: what a command has set up for showing messages ends with its test."""
+    logger = logging.getLogger("pneunet")
+    logger.handlers.clear()
+    logger.setLevel(logging.NOTSET)
+    logger.propagate = True
 
 
 @pytest.fixture

@@ -28,5 +28,6 @@ def show_on_screen() -> None:
     """Print what pneunet says, from level INFO on, on rank 0's standard output."""
     logger = logging.getLogger("pneunet")
     logger.setLevel(logging.INFO if is_rank_0() else logging.CRITICAL)
+    logger.propagate = False  # ffcx gives the root logger a handler of its own, on standard error
     if not any(isinstance(handler, _Screen) for handler in logger.handlers):
         logger.addHandler(_Screen())
