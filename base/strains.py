@@ -30,6 +30,7 @@ class RodStrains:
 
     @classmethod
     def unstrained(cls) -> "RodStrains":
+        """(3,) at rest."""
         return cls([1.0, 0.0, 0.0], [0.0, 0.0, 0.0])
 
     @classmethod

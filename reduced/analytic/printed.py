@@ -126,6 +126,7 @@ def largest_twist(
 
 
 def main() -> None:
+    """What the module is for, printed."""
     for fibre_modulus in (twisting.PAPER_FIBRE_MODULUS, 100 * twisting.PAPER_FIBRE_MODULUS):
         tube = TwistingTube(3.0, 7.0, twisting.PAPER_MU, fibre_modulus)
         tau, angle, pressure = largest_twist(tube, range(30, 90, 10), 2e-3)

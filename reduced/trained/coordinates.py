@@ -112,9 +112,8 @@ class Coordinates:
 
     def closing_load(self, pressure: np.ndarray, lead: np.ndarray) -> np.ndarray:
         """(n,) what walls close in proportion to, almost: the leading strain of a one-sided, the pressure of
-        a twisting segment, whose stretch opens the gaps while its walls bulge. (Measured, of the load at
-        which walls touch: the 90th percentile of the error is 9 and 7 % of the top one; the other way round
-        20 and 15 %.)"""
+        a twisting segment, whose stretch opens the gaps while its walls bulge. (Measured: the other way round
+        first touch is missed by twice as much.)"""
         return lead if self.kind == ONE_SIDED else pressure
 
     def closing_inputs(self, shape: np.ndarray, load: np.ndarray) -> np.ndarray:

@@ -2,10 +2,9 @@
 
 Strains over pressure bend ever more towards a limit load, each design's at its own place, and end there.
 Along the path itself, at whatever leading strain, nothing happens at a limit load: learned is the pressure
-over the leading strain as a function of shape and leading strain, and the other strains over it. (Measured,
-against functions of the pressure: a fifth to a quarter off the 95th percentile of the error.) Where walls
-touch they have a kink, so by how much walls would overlap is an input as well. (Measured, one-sided: an
-eighth off the 95th percentile of the tip error, a fifth off the median.) The leading strain at a pressure is
+over the leading strain as a function of shape and leading strain, and the other strains over it. (Measured: a
+fifth off the error over the pressure.) Where walls touch they have a kink, so by how much walls would overlap
+is an input as well. (Measured: an eighth off the error of the tips.) The leading strain at a pressure is
 found from it by Euler's method: each step goes to where the parabola with the curve's value, slope and
 curvature meets the pressure, or to its top where it does not: beyond a limit load.
 """

@@ -2,8 +2,7 @@
 
 Where walls meet it jumps, that of bending most, and from there on depends on how far they would overlap. So
 what it is without contact, and what contact adds, are learned apart, each from the states that tell.
-(Measured, against one process that is told whether walls touch: a sixth to a quarter off the 95th percentile
-of the error.)
+(Measured: a sixth off the error of one process that is told whether walls touch.)
 """
 
 from dataclasses import dataclass
