@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 SETUP = "make setup, then .venv/bin/pneunet doctor"
@@ -152,7 +153,7 @@ def check_ranks() -> Finding:
     return Finding("2 ranks", ok, "sum of ranks is right" if ok else text, SETUP)
 
 
-def findings():
+def findings() -> Iterator[Finding]:
     """The findings, one after the other as they are made."""
     text = f"{sys.version.split()[0]}, {sys.executable}"
     yield Finding("Python", sys.version_info >= (3, 11), text, SETUP)
