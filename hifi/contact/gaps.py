@@ -95,6 +95,8 @@ class Contact:
 
     def _sum(self, parts, columns):
         """This rank's rows of the sum of all ranks' sparse matrices (size, columns)."""
+        if not self.comm.allreduce(len(parts)):
+            return sp.csr_matrix((self._owned.stop - self._owned.start, columns))
         total = sum(parts, sp.csr_matrix((self._size, columns)))
         return sum(self.comm.allgather(total))[self._owned]
 
@@ -108,8 +110,6 @@ class Contact:
         self._now = self.sides()
         deepest = self.comm.allreduce(max((side.depth for side in self._now), default=0.0), op=MPI.MAX)
         self.overreach = deepest / DEEPEST
-        if not self.overreach:
-            return np.zeros(self._owned.stop - self._owned.start)
         return self._sum([side.forces() for side in self._now], 1).toarray()[:, 0]
 
     def tangent(self) -> sp.csr_matrix:

@@ -10,7 +10,7 @@ from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.fem.solver import NotConverged, PredictorTooFar
 from pneunet.hifi.path.newton import Newton, NewtonOptions
 from pneunet.hifi.path.stepping import lagrange_coefficients
-from pneunet.hifi.path.system import Control, System
+from pneunet.hifi.path.system import PathControl, System
 
 #: a compliance that has grown this often since the start announces a limit point of the load
 SOFTENED = 4.0
@@ -69,7 +69,7 @@ class EquilibriumPath:
     memory = 3
 
     def __init__(
-        self, system: System, control: Control, options: NewtonOptions | None = None, start: float = 0.0
+        self, system: System, control: PathControl, options: NewtonOptions | None = None, start: float = 0.0
     ):
         self.system, self.control = system, control
         self.newton = Newton(system, control, options)

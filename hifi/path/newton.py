@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from pneunet.hifi.fem.solver import NotConverged
-from pneunet.hifi.path.system import Control, System
+from pneunet.hifi.path.system import PathControl, System
 
 #: how often a correction is shortened at most
 SHORTENINGS = 4
@@ -55,7 +55,7 @@ class NewtonResult:
 class Newton:
     """Iterates a system to equilibrium at a value of its control's parameter."""
 
-    def __init__(self, system: System, control: Control, options: NewtonOptions | None = None):
+    def __init__(self, system: System, control: PathControl, options: NewtonOptions | None = None):
         self.system, self.control = system, control
         self.options = options or NewtonOptions()
         self.current = False  # whether there is a factorisation to lag

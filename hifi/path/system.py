@@ -49,7 +49,7 @@ class System(Protocol):
         """Of the cavity, mm3."""
 
 
-class Control(Protocol):
+class PathControl(Protocol):
     """What the scalar parameter of a path is: hifi.path.control."""
 
     name: str

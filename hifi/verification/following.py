@@ -18,7 +18,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath
 from pneunet.hifi.path.newton import Newton, NewtonOptions, NewtonResult
 from pneunet.hifi.path.rod_coordinates import RodCoordinates
 from pneunet.hifi.path.stepping import StepSize, run_steps
-from pneunet.hifi.path.system import Control
+from pneunet.hifi.path.system import PathControl
 from pneunet.hifi.verification.bodies import TaggedMesh
 
 
@@ -62,7 +62,7 @@ def follow(
     loads: Sequence[float],
     observe: Callable[[], Any],
     first: float = 0.1,
-    control: Control | None = None,
+    control: PathControl | None = None,
     start: float = 0.0,
     options: NewtonOptions | None = None,
 ) -> list:
