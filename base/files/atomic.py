@@ -91,6 +91,17 @@ def output_directory(path: str | Path) -> Path:
     return path
 
 
+@contextmanager
+def room_in(directory: str | Path, then: str = "") -> Iterator[None]:
+    """Where `directory` is written to while work goes on: a full disk is an InputError that says what to do
+    `then`."""
+    try:
+        yield
+    except OSError as error:
+        why = error.strerror or error
+        raise InputError(f"{directory}: cannot be written to ({why}): make room there{then}") from None
+
+
 def require_writable(path: str | Path) -> None:
     """InputError when `path` could not be made or written to; makes nothing itself, for use before long
     work."""

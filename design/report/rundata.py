@@ -7,18 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.schemas import (
-    CENTRELINE,
-    CENTRELINES,
-    POINT,
-    SEGMENTS,
-    STEPS,
-    STRAINS,
-    TARGET,
-    WALLS,
-    WORDS,
-    read_table,
-)
+from pneunet.base.files import schemas
+from pneunet.base.files.schemas import read_table
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.geometry.designfile import DesignFile, body_tables, read_design_file
@@ -115,8 +105,8 @@ def read_design_folder(directory: str | Path) -> "DesignFolder":
     return DesignFolder(
         directory,
         design,
-        _columns(read_table(target, TARGET), TARGET) if target.is_file() else None,
-        _centreline(read_table(centreline, CENTRELINE)) if centreline.is_file() else None,
+        _columns(read_table(target, schemas.TARGET), schemas.TARGET) if target.is_file() else None,
+        _centreline(read_table(centreline, schemas.CENTRELINE)) if centreline.is_file() else None,
         _json(directory / "run.json"),
         _json(directory / "mesh" / "mesh.json"),
         None if stale else solve,
@@ -138,14 +128,14 @@ def _solve(directory):
     """The solve, if a step beyond the rest state was accepted; else None."""
     if not (directory / "steps.csv").is_file():
         return None
-    steps = read_table(directory / "steps.csv", STEPS)
+    steps = read_table(directory / "steps.csv", schemas.STEPS)
     if len(steps) < 2:
         return None
-    lines = read_table(directory / "centrelines.csv", CENTRELINES)
-    segments = read_table(directory / "segments.csv", SEGMENTS)
+    lines = read_table(directory / "centrelines.csv", schemas.CENTRELINES)
+    segments = read_table(directory / "segments.csv", schemas.SEGMENTS)
     last, solution = steps[-1]["step"], directory / "solution.pvd"
     s, points = _centreline(lines[lines["step"] == last])
-    strains = _columns(segments[segments["step"] == last], STRAINS)
+    strains = _columns(segments[segments["step"] == last], schemas.STRAINS)
     return Solution(
         steps=steps,
         pressure=steps[-1]["pressure_kPa"] * MPA_PER_KPA,
@@ -169,13 +159,13 @@ def _columns(table, names):
 
 def _centreline(table):
     """Arc lengths (n,) and points (n, 3), mm."""
-    return table["s_mm"], _columns(table, POINT)
+    return table["s_mm"], _columns(table, schemas.POINT)
 
 
 def _walls(path):
     if not path.is_file():
         return []
-    table = read_table(path, [name for name in WALLS if name not in WORDS])
+    table = read_table(path, [name for name in schemas.WALLS if name not in schemas.WORDS])
     return [
         (int(row["segment"]), 1 if row["side"] == "top" else -1, int(row["gap"]), float(row["distance_mm"]))
         for row in table[np.isfinite(table["distance_mm"])]

@@ -19,6 +19,7 @@ from pneunet.geometry import tags
 from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.contact.walls import distances_from
 from pneunet.hifi.fem import surface
+from pneunet.hifi.fem.agreement import gathered
 from pneunet.hifi.fem.mixed_field import MixedField
 
 #: slabs in the length that counts as far apart
@@ -44,14 +45,9 @@ class BodyDistance:
         self.diameter = max(float(np.hypot(s.width, h)) for s, h in zip(manipulator.segments, heights))
         self.apart = max(self.diameter, *(s.pitch for s in manipulator.segments))
         self._local = surface.facet_nodes(problem, tags.OUTER, tags.TIP, tags.BASE)
-        X = self._gather(problem.nodes)
+        X = gathered(self.comm, problem.nodes[self._local])
         if self.comm.rank == 0:
             self._arrange(X)
-
-    def _gather(self, positions):
-        """(facets of all ranks, 6, 3) on rank 0, None elsewhere."""
-        parts = self.comm.gather(positions[self._local], root=0)
-        return np.concatenate(parts) if self.comm.rank == 0 else None
 
     def _arrange(self, X):
         """Nodes of the gathered facets, each once, and their slabs."""
@@ -68,7 +64,8 @@ class BodyDistance:
 
     def smallest(self, array: np.ndarray | None = None) -> float | None:
         """Signed distance in mm, on rank 0 (None elsewhere); inf for a body too short to have far parts."""
-        positions = self._gather(self.problem.nodes + self.problem.displacement(array))
+        moved = self.problem.nodes + self.problem.displacement(array)
+        positions = gathered(self.comm, moved[self._local])
         return None if self.comm.rank else self._smallest(positions.reshape(-1, 3)[self._first])
 
     def _smallest(self, x):

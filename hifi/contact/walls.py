@@ -14,6 +14,7 @@ from pneunet.base import se3
 from pneunet.geometry import tags
 from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.fem import surface
+from pneunet.hifi.fem.agreement import gathered
 from pneunet.hifi.fem.mixed_field import MixedField
 
 _TOLERANCE = 1e-6
@@ -70,14 +71,8 @@ class WallDistances:
         self.facets = np.concatenate(self.facets) if self.facets else np.zeros((0, 6), int)
         #: (facets,) of this rank: walls 2 g and 2 g + 1 face each other across gap g
         self.wall_of_facet = np.array(wall_of_facet, int)
-        gathered = self.comm.gather(self.wall_of_facet, root=0)
-        self._wall = np.concatenate(gathered) if self.comm.rank == 0 else None
-        self.reference = self._gather(problem.nodes)
-
-    def _gather(self, positions):
-        """(facets of all ranks, 6, 3) on rank 0, None elsewhere."""
-        parts = self.comm.gather(positions[self.facets], root=0)
-        return np.concatenate(parts) if self.comm.rank == 0 else None
+        self._wall = gathered(self.comm, self.wall_of_facet)
+        self.reference = gathered(self.comm, problem.nodes[self.facets])
 
     def distances(self, array: np.ndarray | None = None) -> np.ndarray | None:
         """(gaps,) signed smallest distances in mm, on rank 0 (None elsewhere); inf where a gap has no
@@ -92,7 +87,8 @@ class WallDistances:
     def at_nodes(self, array: np.ndarray | None = None) -> np.ndarray | None:
         """(facets of all walls, 6) signed distances (mm) of their nodes from the wall that they face, on rank
         0 (None elsewhere)."""
-        positions = self._gather(self.problem.nodes + self.problem.displacement(array))
+        moved = self.problem.nodes + self.problem.displacement(array)
+        positions = gathered(self.comm, moved[self.facets])
         if self.comm.rank != 0:
             return None
         out = np.full(positions.shape[:2], np.inf)
@@ -108,7 +104,7 @@ class WallDistances:
     def node_numbers(self, numbers: np.ndarray) -> np.ndarray | None:
         """(facets of all walls, 6) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes`
         has them."""
-        return self._gather(numbers)
+        return gathered(self.comm, numbers[self.facets])
 
 
 class CellWalls:

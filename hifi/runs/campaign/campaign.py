@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import output_directory, write_text
+from pneunet.base.files.atomic import output_directory, room_in, write_text
 from pneunet.base.files.dataset import DIRECTIONS, UPPER, CellData, columns, write_dataset
 from pneunet.base.files.datasheet import datasheet
 from pneunet.base.files.record import revision, write_record
@@ -82,13 +81,9 @@ class Gathering:
         """Write data set and data sheet of what is known; returns the CellData. InputError when that cannot
         be written."""
         data = self.data()
-        try:
+        with room_in(self.directory):
             write_dataset(self.directory / DATA, data)
             write_text(self.directory / SHEET, datasheet(data))
-        except OSError as error:
-            raise InputError(
-                f"{self.directory}: cannot be written to ({error.strerror or error}): make room there"
-            ) from None
         self.written = time.monotonic()
         return data
 

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
-from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.fem.agreement import gathered, on_rank_0
 from pneunet.hifi.path.equilibrium import EquilibriumPath, LimitPoint, PathState
 from pneunet.hifi.path.stepping import Step
 
@@ -39,43 +39,40 @@ class Checkpoint:
         self.directory, self.solve, self.identity = directory, solve, identity
 
     def accepted(self, m: Measured) -> None:
-        if m.step:
-            _save(self.directory, self.solve, self.identity)
+        if not m.step:
+            return
+        solve, path, problem, newton = self.solve, self.solve.path, self.solve.problem, self.solve.path.newton
+        factorised = [newton.factorised_at] if newton.current else []
+        states = [a.state for a in path.accepted] + [state for state, _ in factorised]
+        content = {
+            "belongs_to": _text(self.identity),
+            "stage": solve.stage,
+            "step": np.array(astuple(solve.last_step), float),
+            "parameter": np.array([a.parameter for a in path.accepted]),
+            "load": np.array([a.load for a in path.accepted] + [load for _, load in factorised]),
+            "volume": np.array([a.volume for a in path.accepted]),
+            "trusted": np.array(path.trusted),
+            "first_compliance": np.array(path.first_compliance),
+            "limit_points": np.array(
+                [[p.load, p.volume, p.kind == "maximum"] for p in path.limit_points]
+            ).reshape(-1, 3),
+            "timings": np.array(list(newton.timings.values())),
+        }
+        for name, dofs, nodes, owned in _fields(problem):
+            X = gathered(problem.mesh.comm, nodes[:owned])
+            values = [gathered(problem.mesh.comm, state[dofs[:owned]]) for state in states]
+            if problem.mesh.comm.rank == 0:
+                order = np.lexsort(np.round(X, 6).T)
+                content |= {f"{name}_nodes": X[order], name: np.array(values)[:, order]}
 
+        def write():
+            # a zip file on a full disk fails a second time, out of reach, when Python discards it
+            archive = io.BytesIO()
+            np.savez(archive, **content)
+            with atomic_path(self.directory / CHECKPOINT) as temporary:
+                temporary.write_bytes(archive.getbuffer())
 
-def _save(directory, solve, identity):
-    path, problem, newton = solve.path, solve.problem, solve.path.newton
-    factorised = [newton.factorised_at] if newton.current else []
-    states = [a.state for a in path.accepted] + [state for state, _ in factorised]
-    content = {
-        "belongs_to": _text(identity),
-        "stage": solve.stage,
-        "step": np.array(astuple(solve.last_step), float),
-        "parameter": np.array([a.parameter for a in path.accepted]),
-        "load": np.array([a.load for a in path.accepted] + [load for _, load in factorised]),
-        "volume": np.array([a.volume for a in path.accepted]),
-        "trusted": np.array(path.trusted),
-        "first_compliance": np.array(path.first_compliance),
-        "limit_points": np.array(
-            [[p.load, p.volume, p.kind == "maximum"] for p in path.limit_points]
-        ).reshape(-1, 3),
-        "timings": np.array(list(newton.timings.values())),
-    }
-    for name, dofs, nodes, owned in _fields(problem):
-        X = _gather(problem.mesh.comm, nodes[:owned])
-        values = [_gather(problem.mesh.comm, state[dofs[:owned]]) for state in states]
-        if problem.mesh.comm.rank == 0:
-            order = np.lexsort(np.round(X, 6).T)
-            content |= {f"{name}_nodes": X[order], name: np.array(values)[:, order]}
-
-    def write():
-        # a zip file on a full disk fails a second time, out of reach, when Python discards it
-        archive = io.BytesIO()
-        np.savez(archive, **content)
-        with atomic_path(directory / CHECKPOINT) as temporary:
-            temporary.write_bytes(archive.getbuffer())
-
-    on_rank_0(problem.mesh.comm, write)
+        on_rank_0(problem.mesh.comm, write)
 
 
 def read_checkpoint(directory: Path, identity: dict[str, Any]) -> dict[str, np.ndarray] | None:
@@ -146,8 +143,3 @@ def _fields(problem):
             space.dofmap.index_map.size_local,
         ),
     )
-
-
-def _gather(comm, rows):
-    parts = comm.gather(rows, root=0)
-    return np.concatenate(parts) if comm.rank == 0 else None

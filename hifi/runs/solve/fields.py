@@ -8,7 +8,7 @@ from pneunet.base.files.atomic import write_text
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.fem import compat
-from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.fem.agreement import gathered, on_rank_0
 from pneunet.hifi.fem.surface import EDGES
 from pneunet.hifi.runs.solve.goal import Goal
 from pneunet.hifi.runs.solve.tables import Tables
@@ -37,8 +37,8 @@ class FieldWriter:
         local_to_global = index_map.local_to_global(
             np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
         )
-        self._cells = self._gather(local_to_global[cells])
-        self._points = self._gather(problem.nodes[: self._owned])
+        self._cells = gathered(self.comm, local_to_global[cells])
+        self._points = gathered(self.comm, problem.nodes[: self._owned])
         self._wall_nodes = self.walls.node_numbers(local_to_global)
         self._listed = []
 
@@ -53,10 +53,6 @@ class FieldWriter:
         for old in self.directory.glob("step_*.vtu"):
             if old.name not in names:
                 old.unlink()
-
-    def _gather(self, rows):
-        parts = self.comm.gather(rows, root=0)
-        return np.concatenate(parts) if self.comm.rank == 0 else None
 
     def _pressure_at_nodes(self):
         """Multiplier at the P2 nodes: corner values, averaged on mid-edges. One value per local displacement
@@ -85,7 +81,7 @@ class FieldWriter:
             "pressure": self._pressure_at_nodes()[: self._owned],
             "stretch": self.stretch.nodal()[: self._owned],
         }
-        fields = {name: self._gather(values) for name, values in fields.items()} | {
+        fields = {name: gathered(self.comm, values) for name, values in fields.items()} | {
             "wall_distance_mm": self._wall_distance()
         }
         on_rank_0(self.comm, lambda: self._save(fields, m))

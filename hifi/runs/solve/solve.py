@@ -3,8 +3,7 @@
 import json
 import logging
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Protocol
@@ -12,7 +11,7 @@ from typing import Protocol
 from mpi4py import MPI
 
 from pneunet.base.errors import ConvergenceError, InputError
-from pneunet.base.files.atomic import output_directory
+from pneunet.base.files.atomic import output_directory, room_in
 from pneunet.geometry.designfile import DesignFile, body_tables
 from pneunet.geometry.loading import Extras
 from pneunet.hifi.body import tip
@@ -28,6 +27,9 @@ from pneunet.hifi.runs.solve.record import Record
 from pneunet.hifi.runs.solve.tables import Tables
 
 log = logging.getLogger(__name__)
+
+#: what to do after a full disk
+RESUME = " and go on with pneunet solve --resume"
 
 
 class Observer(Protocol):
@@ -82,7 +84,7 @@ def solve_design(
         complete = goal.share(solve.stage, before.load, solve.rest_volume) == 1
         started -= before.seconds
         if writer:
-            with _room_in(out):
+            with room_in(out, RESUME):
                 writer.resume(tables)
     extras = on_rank_0(comm, lambda: _extras_there(out)) if complete else {}
     missing = {name for name, wanted in asdict(design.measure).items() if wanted and name not in extras}
@@ -110,7 +112,7 @@ def solve_design(
         status = f"stopped at {reached} of {goal.key} = {goal.value:g}: {result.reason}"
     elif "tip_stiffness" in missing:
         extras["tip_stiffness"] = tip.stiffness(solve)
-    with _room_in(out):
+    with room_in(out, RESUME):
         record.finished(status, last, result.failures)
     solve.destroy()
     if result.reason:
@@ -119,7 +121,7 @@ def solve_design(
         log.info("blocked force: the same body with its tip held")
         held = design.manipulator, mesh_path, last.pressure, loads, comm, penalty
         extras["blocked_force"] = tip.blocked_force(*held)
-        with _room_in(out):
+        with room_in(out, RESUME):
             record.finished(status, last, result.failures)
     ending = goal.done(last, solve.stage, solve.path.parameter)
     log.info("; ".join([ending, *(point.text for point in last.limit_points), f"results in {out}"]))
@@ -149,21 +151,9 @@ class _Told:
 
     def accepted(self, m):
         self.last = m
-        with _room_in(self.out):
+        with room_in(self.out, RESUME):
             for observer in self.observers:
                 observer.accepted(m)
-
-
-@contextmanager
-def _room_in(out: Path) -> Iterator[None]:
-    """Where `out` is written to: a full disk, which all ranks hear of, is the user's to mend."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(
-            f"{out}: cannot be written to ({error.strerror or error}): make room there and go on with pneunet"
-            " solve --resume"
-        ) from None
 
 
 def _go_on(kept, solve, goal, tables, out):

@@ -9,8 +9,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import output_directory, read_csv, write_csv
+from pneunet.base.files.atomic import output_directory, read_csv, room_in, write_csv
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CASE, ENDING, MARKS
 from pneunet.hifi.contact.touch import marked
@@ -126,14 +125,6 @@ class StudyTable:
             ]
         # a varied pressure is the case's top pressure; the level's has the plain name
         named = [f"top_{name}" if name in columns else name for name in study.variables]
-        try:
-            write_csv(
-                self.directory / "study.csv",
-                [*CASE, *named, *columns, *ENDING],
-                rows,
-            )
-        except OSError as error:
-            raise InputError(
-                f"{self.directory}: cannot be written to ({error.strerror or error}): make room there and"
-                " start the study again"
-            ) from None
+        header = [*CASE, *named, *columns, *ENDING]
+        with room_in(self.directory, " and start the study again"):
+            write_csv(self.directory / "study.csv", header, rows)
