@@ -62,11 +62,8 @@ class HelicalCell:
         # half of the chamber; the other half is its image
         y, self.along_weights = _gauss(0.0, 1.0, ALONG_POINTS)
         self.along = along_shapes(y)  # (derivative, shape, points)
-        self.walls: tuple[Term, ...] = (
-            (membrane, *self._core()),
-            (panel, *self._walls()),
-            (bulged_wall, *self._long_walls()),
-        )
+        self.walls: list[Term] = [(membrane, *self._core()), (panel, *self._walls())]
+        self.walls.append((bulged_wall, *self._long_walls()))
         self.gas: Term = (product, *self._gas())
         self.small = self._small_strains()
 
@@ -77,12 +74,9 @@ class HelicalCell:
         half = s.channel_height / 2
         rows, weights = [], []
         for fraction, part, top in ((share, 1 - share, s.cavity_floor), (1 - share, -share, s.core_top)):
+            mu = s.layer_material.mu if s.layer_material else None
             layers = [
-                *(
-                    [(s.core_bottom, s.layer_top, s.width * s.layer_material.mu / self.mu)]
-                    if s.layer_material
-                    else []
-                ),
+                *([(s.core_bottom, s.layer_top, s.width * mu / self.mu)] if mu else []),
                 (s.layer_top, -half, s.width),
                 (-half, min(half, top), s.width - s.channel_width),
                 (half, top, s.width),
@@ -126,18 +120,9 @@ class HelicalCell:
         shape, slope, _ = wall_shapes(x)
         z = self.cell.foot + H * x
         half = self.length / 2
-        slope_up = (
-            s.cavity_thickness
-            / 2
-            / H
-            * np.tensordot(slope, self.cell.wall_amplitudes(self.along[0]), axes=(0, 0))
-        )
-        slope_along = (
-            s.cavity_thickness
-            / 2
-            / half
-            * np.tensordot(shape, self.cell.wall_amplitudes(self.along[1]), axes=(0, 0))
-        )
+        ends, slopes = (s.cavity_thickness / 2 * self.cell.wall_amplitudes(self.along[d]) for d in (0, 1))
+        slope_up = np.tensordot(slope / H, ends, axes=(0, 0))
+        slope_along = np.tensordot(shape / half, slopes, axes=(0, 0))
         arguments = np.broadcast_arrays(
             self.cell.along_eta(z)[:, None], self.cell.section("height"), slope_along, slope_up
         )
@@ -181,25 +166,16 @@ class HelicalCell:
         # two walls; plate energy/(mu/2) = wall^3/3 (kx^2 + ky^2 + kx ky + kxy^2): E = 3 mu, nu = 1/2
         wall = s.wall**3 / 3
         cross = integral(kx, ky)
-        hessian = (
-            2
-            * wall
-            * (2 * integral(kx, kx) + 2 * integral(ky, ky) + cross + cross.T + 2 * integral(kxy, kxy))
-        )
+        own = integral(kx, kx) + integral(ky, ky) + integral(kxy, kxy)
+        hessian = 2 * wall * (2 * own + cross + cross.T)
         # top wall of span t + wall, bent by the rotation of its two corners
         span = t + s.wall
         turn = t / 2 / H * self.cell.chamber("corner", self.along[0])
-        hessian += (
-            8 * s.top_wall**3 / 3 / span * 2 * half * np.einsum("i,is,it->st", self.along_weights, turn, turn)
-        )
+        hessian += 8 * s.top_wall**3 / 3 / span * 2 * half * (turn.T * self.along_weights) @ turn
         # side walls, bent by the rotation of the long walls' ends
-        turn = (
-            t
-            / 2
-            / half
-            * np.tensordot(profile[0], self.cell.wall_amplitudes(self.cell.end[1]), axes=(0, 0))[:, 0]
-        )
-        hessian += 8 * s.side_wall**3 / 3 / span * 2 * H * np.einsum("i,is,it->st", wx, turn, turn)
+        ends = t / 2 / half * self.cell.wall_amplitudes(self.cell.end[1])
+        turn = np.tensordot(profile[0], ends, axes=(0, 0))[:, 0]
+        hessian += 8 * s.side_wall**3 / 3 / span * 2 * H * (turn.T * wx) @ turn
         # sliding shears the top wall, and the long walls where they do not follow the core
         tops = np.array([self.cell.foot + H])
         shear = (self.cell.section("slide") + self.cell.shear(tops))[0]

@@ -90,9 +90,8 @@ def centreline(
     piece = np.repeat(np.arange(m), counts)
     within = (np.arange(piece.size) - (last - counts)[piece]) * (lengths / counts)[piece]
     # of the whole pieces, then of the samples in them
-    coefficients = se3.screw_coefficients(
-        np.concatenate([rate, rate[piece]]), np.concatenate([lengths, within])
-    )
+    rates, reaches = np.concatenate([rate, rate[piece]]), np.concatenate([lengths, within])
+    coefficients = se3.screw_coefficients(rates, reaches)
     joints = _joints(coefficients[:m], basis, base_pose)
     s, poses = np.empty(piece.size + 1), np.empty((piece.size + 1, 4, 4))
     s[:-1], s[-1] = (ends - lengths)[piece] + within, ends[-1]

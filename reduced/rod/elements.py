@@ -33,11 +33,8 @@ class NodalLoads:
     over the forces f that act at points r (mm) of a node's section frame; moments (n, 3) in N mm."""
 
     def __init__(self, count: int) -> None:
-        self.forces, self.spreads, self.moments = (
-            np.zeros((count, 3)),
-            np.zeros((count, 3, 3)),
-            np.zeros((count, 3)),
-        )
+        self.forces, self.moments = np.zeros((2, count, 3))
+        self.spreads = np.zeros((count, 3, 3))
 
     def add(self, node: int | slice, force: np.ndarray, point: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """Forces (m, 3) at points (m, 3) of the frames of distinct nodes (m,)."""
@@ -94,42 +91,6 @@ class RodElements:
         for before, step, after in zip(out, steps, out[1:]):
             before.dot(step, after)
         return out
-
-    def energy(self, x: np.ndarray, loads: NodalLoads) -> float:
-        """Enthalpy of the sections less the work of the forces, N mm; moments fixed in space have no
-        energy."""
-        poses = self.poses(x)[1:]
-        return (
-            self.lengths @ self._by_law("psi", x, ())
-            - np.trace(_turned(poses, loads), axis1=1, axis2=2).sum()
-        )
-
-    def gradient(self, x: np.ndarray, loads: NodalLoads) -> np.ndarray:
-        """(n, 6) generalised forces that balance to zero: the energy's gradient by x, moments' work
-        included."""
-        poses = self.poses(x)
-        outward = _outward(poses[1:], loads)[0]
-        return (
-            self.lengths[:, None] * self.wrenches(x)
-            - (_transposed(self._carriers(x, poses)) @ outward[..., None])[..., 0]
-        )
-
-    def hessian(self, x: np.ndarray, loads: NodalLoads) -> np.ndarray:
-        """(n, 6, n, 6) derivative of `gradient` by x, dense; symmetric for conservative loads. For tests and
-        small rods."""
-        n, blocks = len(x), self._linearised(x, loads)[1]
-        matrix = np.zeros((n, 6, n, 6))
-        diagonal, lower, upper = blocks
-        i = np.arange(n)
-        matrix[i, :, i], matrix[i[1:], :, i[:-1]], matrix[i[:-1], :, i[1:]] = diagonal, lower, upper
-        nodes = np.einsum("ij,jab->iajb", np.tril(np.ones((n, n))), self._carriers(x, self.poses(x))).reshape(
-            6 * n, 6 * n
-        )
-        return (nodes.T @ matrix.reshape(6 * n, 6 * n) @ nodes).reshape(n, 6, n, 6)
-
-    def _carriers(self, x, poses):
-        """A (n, 6, 6): the spatial twist of all nodes behind an element per change of its x."""
-        return self._h * (adjoint(poses[:-1]) @ LeftJacobian(x * self.lengths[:, None]).matrix)
 
     def _linearised(self, x, loads):
         """(inverses of A, the tangent's blocks (diagonal, lower, upper) and the imbalance (n, 6) in the

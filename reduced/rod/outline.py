@@ -22,9 +22,8 @@ def _box(divisions):
         nu, nv = divisions[u], divisions[v]
         grid_u, grid_v = np.meshgrid(np.linspace(0, 1, nu + 1), np.linspace(0, 1, nv + 1), indexing="ij")
         index = np.arange((nu + 1) * (nv + 1)).reshape(nu + 1, nv + 1)
-        face = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(
-            -1, 4
-        )
+        around = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
+        face = np.stack(around, axis=-1).reshape(-1, 4)
         for side in (0.0, 1.0):
             corners = np.empty((index.size, 3))
             corners[:, axis], corners[:, u], corners[:, v] = side, grid_u.ravel(), grid_v.ravel()

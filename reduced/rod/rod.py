@@ -65,10 +65,8 @@ class Rod:
         object.__setattr__(self, "base_pose", np.asarray(self.base_pose, float))
         if not self.pieces:
             raise InputError("pieces: a rod needs at least one")
-        if (
-            self.base_pose.shape != (4, 4)
-            or abs(self.base_pose[:3, :3].T @ self.base_pose[:3, :3] - np.eye(3)).max() > 1e-6
-        ):
+        R = self.base_pose[:3, :3]
+        if self.base_pose.shape != (4, 4) or abs(R.T @ R - np.eye(3)).max() > 1e-6:
             raise InputError("base_pose: give a (4, 4) pose with a rotation matrix")
 
     @classmethod
@@ -109,12 +107,8 @@ class Rod:
                 (mass, z), bend = passive_mass(segment), float(q[5])
                 bare = known.setdefault((segment.key, bend), passive_law(segment, bend))
                 pieces.append(RodPiece(length, bare, 0.0, mass, (0.0, z), q))
-        last = segments[-1]
-        return cls(
-            pieces,
-            np.eye(4) if base_pose is None else base_pose,
-            (0.0, (last.core_bottom + last.core_top) / 2),
-        )
+        tip_centre = (0.0, (segments[-1].core_bottom + segments[-1].core_top) / 2)
+        return cls(pieces, np.eye(4) if base_pose is None else base_pose, tip_centre)
 
     @property
     def lengths(self) -> np.ndarray:
@@ -148,15 +142,12 @@ class Rod:
         shapes alone.
         """
         loads = loads or DeadLoads()
-        for name, value, low, high in (
-            ("tolerance", tolerance, 1e-9, 0.1),
-            ("first_load", first_load, 1e-3, 1.0),
-        ):
+        bounds = ("tolerance", tolerance, 1e-9, 0.1), ("first_load", first_load, 1e-3, 1.0)
+        for name, value, low, high in bounds:
             if not low <= value <= high:
                 raise InputError(f"{name} = {value:g} must lie in {low:g}..{high:g}")
-        vectors = [
-            np.asarray(v, float) for v in (loads.gravity, loads.tip_force, loads.tip_moment, distributed)
-        ]
+        given = loads.gravity, loads.tip_force, loads.tip_moment, distributed
+        vectors = [np.asarray(v, float) for v in given]
         if any(v.shape != (3,) or not np.isfinite(v).all() for v in vectors):
             raise InputError(
                 "loads: give three finite numbers each for gravity, tip_force, tip_moment and distributed"

@@ -166,20 +166,16 @@ class Coordinates:
     @property
     def names(self) -> list[str]:
         """What `told` gives."""
-        lengths, apart = (
-            [f"{name} / normal pitch" for name in names] for names in (LENGTHS[self.kind], IN_SUMS[self.kind])
-        )
+        both = LENGTHS[self.kind], IN_SUMS[self.kind]
+        lengths, apart = ([f"{name} / normal pitch" for name in names] for names in both)
         return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh", *apart]
 
     def told(self, ranged: np.ndarray) -> np.ndarray:
         """(r,) `ranged` (r,) as a user knows it: degrees, ratios."""
-        squared_cosine, lengths, pressure, level, apart = np.split(
-            ranged, [1, *(1 + len(LENGTHS[self.kind]) + np.arange(3))]
-        )
-        angle = np.degrees(np.arccos(np.sqrt(squared_cosine)))
-        return np.concatenate(
-            [angle, np.exp(lengths), np.maximum(np.exp(pressure) - SMALL_PRESSURE, 0), level, np.exp(apart)]
-        )
+        ends = [1, *(1 + len(LENGTHS[self.kind]) + np.arange(3))]
+        squared_cosine, lengths, load, level, apart = np.split(ranged, ends)
+        angle, pressure = np.degrees(np.arccos(np.sqrt(squared_cosine))), np.exp(load) - SMALL_PRESSURE
+        return np.concatenate([angle, np.exp(lengths), np.maximum(pressure, 0), level, np.exp(apart)])
 
     # ---- free strains
     @cached_property
@@ -198,11 +194,9 @@ class Coordinates:
 
     def strains(self, shape: np.ndarray, lead: np.ndarray, ratios: np.ndarray) -> np.ndarray:
         """(n, 6) of the leading strain (n,) and the others' learned ratios (n, p - 1)."""
-        of_lead, of_others = self._places
-        lead = lead[:, None]
-        return (
-            REST + lead * of_lead + (lead * ratios * odd(self.strain_parity[1:], cosine(shape))) @ of_others
-        )
+        (of_lead, of_others), lead = self._places, lead[:, None]
+        others = lead * ratios * odd(self.strain_parity[1:], cosine(shape))
+        return REST + lead * of_lead + others @ of_others
 
     @cached_property
     def _places(self):
@@ -214,9 +208,8 @@ class Coordinates:
         """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, .) by inputs,
         those by others than the shape left out; one more, 0, for the pressure."""
         by = np.zeros((*slopes.shape[:2], len(SHAPE) + 1))
-        by[:, :, :-1] = (
-            slopes[:, :, 1 : len(LENGTHS[self.kind]) + 1] / self._lengths(shape)[:, None]
-        ) @ self._sums.T
+        by_lengths = slopes[:, :, 1 : len(LENGTHS[self.kind]) + 1]
+        by[:, :, :-1] = (by_lengths / self._lengths(shape)[:, None]) @ self._sums.T
         by[:, :, 0] = slopes[:, :, 0] * (2 * cosine(shape) * _by_angle(shape))[:, None]
         return by
 
@@ -235,9 +228,8 @@ class Coordinates:
         out[:, first] = by_lead
         for j, (i, parity) in enumerate(zip(others, self.strain_parity[1:])):
             factor = c if parity < 0 else np.ones(len(lead))
-            out[:, i] = (factor * lead)[:, None] * by_ratios[:, j] + (factor * ratios[:, j])[
-                :, None
-            ] * by_lead
+            out[:, i] = (factor * lead)[:, None] * by_ratios[:, j]
+            out[:, i] += (factor * ratios[:, j])[:, None] * by_lead
             if parity < 0:
                 out[:, i, 0] += _by_angle(shape) * ratios[:, j] * lead
         return out

@@ -35,24 +35,16 @@ def write_law(path: Path, law: TrainedLaw) -> None:
         for name, found in zip(PROCESSES, known):
             for number, process in enumerate(found.processes if found else ()):
                 for f in fields(GaussianProcess):
-                    arrays[_key(kind, name, number, f.name)] = np.asarray(
-                        getattr(process, f.name), SHORT.get(f.name)
-                    )
+                    value = np.asarray(getattr(process, f.name), SHORT.get(f.name))
+                    arrays[_key(kind, name, number, f.name)] = value
         arrays[f"{kind}/furthest"] = np.asarray(k.path.furthest)
-        arrays |= {
-            f"{kind}/{name}": np.asarray(getattr(k, name))
-            for name in ("quantile", "low", "high", "doubt", "level")
-        }
-        arrays |= {
-            f"{kind}/anharmonic/{name}": np.asarray(getattr(k.anharmonic, name)) for name in ANHARMONIC
-        }
-    about = {
-        "kinds": list(law.kinds),
-        "shape": list(SHAPE),
-        "lengths": {k: list(v) for k, v in LENGTHS.items()},
-        **law.about,
-    }
-    write_archive(path, SCHEMA, about, arrays, compress=True)
+        for name in ("quantile", "low", "high", "doubt", "level"):
+            arrays[f"{kind}/{name}"] = np.asarray(getattr(k, name))
+        for name in ANHARMONIC:
+            arrays[f"{kind}/anharmonic/{name}"] = np.asarray(getattr(k.anharmonic, name))
+    lengths = {kind: list(names) for kind, names in LENGTHS.items()}
+    about = {"kinds": list(law.kinds), "shape": list(SHAPE), "lengths": lengths}
+    write_archive(path, SCHEMA, about | law.about, arrays, compress=True)
 
 
 def _key(kind, name, number, field):
@@ -62,11 +54,9 @@ def _key(kind, name, number, field):
 def read_law(path: str | Path, name: str | None = None) -> TrainedLaw:
     """The law in a file, by default named like it; InputError when it is none or of another version."""
     with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, archive):
-        # what processes have in common is inflated once
-        stored = {key: archive[key] for key in archive.files}
-        return TrainedLaw(
-            {kind: _read_kind(stored, kind) for kind in about["kinds"]}, about, name or str(path)
-        )
+        stored = dict(archive)  # what processes have in common is inflated once
+        kinds = {kind: _read_kind(stored, kind) for kind in about["kinds"]}
+        return TrainedLaw(kinds, about, name or str(path))
 
 
 def _read_kind(stored, kind):

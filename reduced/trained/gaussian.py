@@ -73,11 +73,8 @@ class GaussianProcess:
         """What `linear` gives at `shift` (d + 2 + p,), how it grows from there (d, d + 2 + p), and what its
         squares are times (d,)."""
         d, constant = len(self.to_kernel), self.weights[len(self.points)]
-        at_shift, slopes = (
-            np.concatenate([np.zeros(d), [1.0, 0.0], constant]),
-            [self.to_kernel, np.zeros((d, 2)), self.plane],
-        )
-        return at_shift, np.hstack(slopes), np.full(d, -0.5)
+        slopes = np.hstack([self.to_kernel, np.zeros((d, 2)), self.plane])
+        return np.concatenate([np.zeros(d), [1.0, 0.0], constant]), slopes, np.full(d, -0.5)
 
     @cached_property
     def _columns(self):
@@ -85,9 +82,8 @@ class GaussianProcess:
 
     @cached_property
     def _weighed_points(self):
-        return (self.weights[: len(self.points), :, None] * self.points[:, None, :]).reshape(
-            len(self.points), -1
-        )
+        m = len(self.points)
+        return (self.weights[:m, :, None] * self.points[:, None, :]).reshape(m, -1)
 
     def linear(self, x: np.ndarray) -> np.ndarray:
         """(n, d + 2 + p) of inputs x (n, d), side by side: those where distances are the kernel's, a (n, d);
@@ -112,9 +108,8 @@ class GaussianProcess:
         """(m + 1 + d, n) of rows (n, m + 1 + d) as `value_rows` gives them, by weights in units of their
         prior's deviation."""
         m = len(self.points)
-        return np.vstack(
-            [solve_triangular(self._kernel_root, rows[:, :m].T, lower=True), np.sqrt(TREND) * rows[:, m:].T]
-        )
+        smooth = solve_triangular(self._kernel_root, rows[:, :m].T, lower=True)
+        return np.vstack([smooth, np.sqrt(TREND) * rows[:, m:].T])
 
     @cached_property
     def _root(self):
@@ -169,11 +164,8 @@ class GaussianProcess:
         explain, of what is left there."""
         z = (x - self.shift) / self.width
         rows = self._in_prior(value_rows(z, self.inducing, self._square_metric))
-        return (
-            z @ self._square_metric,
-            rows[: len(self.points)],
-            solve_triangular(self._root, rows, lower=True),
-        )
+        known = solve_triangular(self._root, rows, lower=True)
+        return z @ self._square_metric, rows[: len(self.points)], known
 
 
 def _columns(b):

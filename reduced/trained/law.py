@@ -133,13 +133,8 @@ class TrainedLaw(SegmentLaw):
 
     def of(self, segment: Segment) -> "TrainedSection":
         """InputError for a kind that it was not taught."""
-        return TrainedSection(
-            self._kind(segment),
-            shape_numbers(segment),
-            normal_pitch(segment),
-            segment.material.mu,
-            _ties(segment),
-        )
+        law, shape, pitch = self._kind(segment), shape_numbers(segment), normal_pitch(segment)
+        return TrainedSection(law, shape, pitch, segment.material.mu, _ties(segment))
 
     def table(self, segments: Sequence[Segment], pressures: ArrayLike) -> RodStrains:
         """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
@@ -204,11 +199,8 @@ class TrainedSection:
         shape, p = self._rows(pressures)
         free = self.law.free_strains(shape, p)
         closed = self.law.closed(shape, p, free)
-        return (
-            free,
-            *whitening(self.law.kind, self.law.stiffness_at(shape, free, closed)),
-            *self.law.anharmonic_at(shape, free, closed),
-        )
+        white = whitening(self.law.kind, self.law.stiffness_at(shape, free, closed))
+        return free, *white, *self.law.anharmonic_at(shape, free, closed)
 
     def _rows(self, P):
         p = np.atleast_1d(np.asarray(P, float)).ravel() / self.mu

@@ -48,10 +48,8 @@ STEP = 1e-4
 STEEPEST = 1.0
 #: designs seen to touch that suffice to learn what contact adds to the stiffness; and bounds of its noises:
 #: mesh points come into contact one by one
-TELLING, CONTACT_NOISES = (
-    10,
-    tuple((low, np.log(most)) for (low, _), most in zip(LOG_NOISES, (1e-2, 1e-2, 1.0))),
-)
+TELLING = 10
+CONTACT_NOISES = tuple((low, np.log(most)) for (low, _), most in zip(LOG_NOISES, (1e-2, 1e-2, 1.0)))
 #: states that the metric of how far walls close is found on: without slopes, and with one output, more cost
 #: little
 MANY = 1200
@@ -187,9 +185,8 @@ def _fit_smooth(states, like, again):
         return co.learned_stiffness(s.shape, s.matrices)
 
     x, y = inputs(states), outputs(states)
-    known = (
-        np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states) & ~states.touching[:, None]
-    )
+    known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states)
+    known &= ~states.touching[:, None]
     steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
     steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
     data = x, y, states.case, _trust_in_stiffness(states)
@@ -211,9 +208,8 @@ def fit_kind(sample: Sample, like: KindLaw | None = None, again: bool = True) ->
     )
     x = co.ranged(states.shape, states.pressure, states.level)
     level = int(states.level.max())
-    doubt = DOUBT * float(
-        path.deviation(path.at(states.shape, np.maximum(states.pressure, LOWEST), level)[-1]).max()
-    )
+    _, _, there = path.at(states.shape, np.maximum(states.pressure, LOWEST), level)
+    doubt = DOUBT * float(path.deviation(there).max())
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
     low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
     low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides

@@ -55,11 +55,9 @@ def force_error(law: KindLaw, sample: Sample) -> np.ndarray:
     by_v = D1[:, None] * (v + anharmonic_gradient(v, law.anharmonic_at(f.shape, free, closed)))
     forces = np.einsum("nij,ni->nj", M, by_v)
     own, _ = whitening(law.kind, symmetric(f.matrices))
-    white = [
-        np.linalg.solve(np.swapaxes(own, 1, 2), x[..., None])[..., 0]
-        for x in (forces - sample.forces, sample.forces)
-    ]
-    return np.linalg.norm(white[0], axis=1) / np.linalg.norm(white[1], axis=1)
+    both = np.stack([forces - sample.forces, sample.forces], axis=2)
+    error, size = np.linalg.norm(np.linalg.solve(np.swapaxes(own, 1, 2), both), axis=1).T
+    return error / size
 
 
 def symmetric(K: np.ndarray) -> np.ndarray:
@@ -79,13 +77,12 @@ def misses(law: KindLaw, sample: Sample) -> Misses:
     law, sample = replace(law, level=0), sample.on(0)
     loaded = sample.free.loaded
     q = law.free_strains(loaded.shape, loaded.pressure)
+    K = law.free_stiffness(sample.free.shape, sample.free.pressure)
     force = force_error(law, sample) if len(sample.forces) else np.zeros(0)
     return {
         "strain": strain_error(loaded, q),
         "tip": tip_error(loaded, q),
-        "stiffness": stiffness_error(
-            sample.free, law.free_stiffness(sample.free.shape, sample.free.pressure)
-        ),
+        "stiffness": stiffness_error(sample.free, K),
         "force": force[sample.doubled],
         "force in other directions": force[~sample.doubled],
         "inside": within(law, loaded),

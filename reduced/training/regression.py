@@ -146,16 +146,14 @@ def fit_side_by_side(
 def _most_likely(z, y, group, trust, some, slopes, starts, steps, noises):
     """(metric, (noise, common noise, noise of slopes)) by the observations `some` and all slopes."""
     d = z.shape[1]
-    points = np.vstack(
-        [z[some], z[slopes.at] - NEAR / 2 * slopes.ways, z[slopes.at] + NEAR / 2 * slopes.ways]
-    )
+    half = NEAR / 2 * slopes.ways
+    points = np.vstack([z[some], z[slopes.at] - half, z[slopes.at] + half])
     data = []
     for columns in _alike(trust):
         t, v = trust[some, columns[0]], y[np.ix_(some, columns)]
         centred = v - (t[:, None] ** 2 * v).sum(axis=0) / (t**2).sum()
-        data.append(
-            (np.vstack([centred, slopes.values[:, columns]]), 1 / np.append(t, trust[slopes.at, columns[0]]))
-        )
+        doubt = 1 / np.append(t, trust[slopes.at, columns[0]])
+        data.append((np.vstack([centred, slopes.values[:, columns]]), doubt))
     same = group[some][:, None] == group[some]
     bounds = [LOG_SCALE] * d + [(None, None)] * (len(starts[0]) - d - 3) + list(noises)
     settings = {"jac": True, "method": "L-BFGS-B", "bounds": bounds, "options": {"maxiter": steps}}
@@ -234,9 +232,8 @@ def _condition(z, y, group, trust, spots, slopes, shift, width, metric, noises):
         right = np.zeros((len(z) + len(at) + size, k))
         right[:-size] = system.weighed(y[:, columns] - shifted, slopes.values[:, columns], t)
         # of [A b] = Q R the last columns hold Q^T b and, below, what no weights can fit
-        r = qr(np.hstack([system.rows(t), right]), mode="r", overwrite_a=True, check_finite=False)[0][
-            : size + k
-        ]
+        rows = np.hstack([system.rows(t), right])
+        r = qr(rows, mode="r", overwrite_a=True, check_finite=False)[0][: size + k]
         w = solve_triangular(r[:size, :size], r[:size, size:])
         variance[columns] = (r[size:, size:] ** 2).sum(axis=0) / noises[0] / (len(z) + len(at))
         w[m] += shifted

@@ -63,11 +63,7 @@ def digest(path: str | Path) -> str:
 
 
 def run_training(
-    path: Path,
-    out: Path,
-    compare: bool = True,
-    mapping: Map = map,
-    like: Path | None = None,
+    path: Path, out: Path, compare: bool = True, mapping: Map = map, like: Path | None = None
 ) -> TrainedLaw:
     """Train on the data set at `path`; `out` (.npz) gets the law, the same name with .md its tables.
 
