@@ -31,6 +31,7 @@ from mpi4py import MPI
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import output_directory, write_text
 from pneunet.base.files.record import revision
+from pneunet.base.files.toml import as_table, from_table
 from pneunet.base.system.processes import Limits, environment_without_launcher, machine_memory_MB, run_limited
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.runs.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
@@ -46,6 +47,12 @@ RECORD = "record.json"
 #: of the machine's memory, shared by the workers on it when no limit is given
 MEMORY_SHARE = 0.9
 LOCK_SECONDS = 5
+
+
+def case_limits(tables: dict, where: str) -> Limits:
+    """The Limits of one case in the [limits] of a file's tables: an hour unless it says otherwise."""
+    where = f"{where} [limits]"
+    return from_table(Limits, {"time_s": 3600.0} | as_table(tables.get("limits", {}), where), where)
 
 
 @dataclass(frozen=True)

@@ -178,12 +178,12 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
         ("designs = 0", "designs = 0 must lie in"),
         ('kinds = ["both"]', "'one-sided', 'twisting'"),
         ('[[mesh]]\nname = "a"', "mesh_size_mm' is missing"),
-        ('[[mesh]]\nname = "a"\nmesh_size_mm = 2\nslopes = 1', "slopes = 1 must be true or false"),
+        ('[[mesh]]\nname = "a"\nmesh_size_mm = 2\nslopes = 1', "'slopes' must be true or false, not 1"),
         ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
         ("[ranges.one-sided]\nangle_deg = [10, 20]", "must lie in 30..150"),
         (
             "edge_designs = 2\n[edge_ranges.twisting]\nangle_deg = [10, 20]",
-            r"\[edge_ranges.twisting\].*outside 30..150",
+            r"\[edge_ranges.twisting\].*must lie in 30..150",
         ),
         (
             "designs = 9\n[further]\ntwisting = [8, 12]",

@@ -5,47 +5,63 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, number, read_toml, refuse_unknown, to_table
+from pneunet.base.errors import InputError, located
+from pneunet.base.files.toml import as_table, from_table, number, read_toml, refuse_unknown, to_table
 from pneunet.base.materials.laws import material_to_table
+from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.system.processes import Limits
 from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.runs.campaign.sample import PLACES, RANGES, prescribed_states, segments
-from pneunet.hifi.runs.cases import Case
+from pneunet.hifi.runs.cases import Case, case_limits
 
 FUNCTION = "hifi.campaign_case:solve_campaign_case"
-#: s; one case
-DEFAULT_TIME = 3600.0
 #: index of the first edge design, and what their seed is more: both sequences can be extended
 EDGES, EDGE_SEED = 100_000, 200
-KEYS = (
-    "kinds",
-    "designs",
-    "edge_designs",
-    "seed",
-    "held_out_every",
-    "levels",
-    "top_pressure_over_mu",
-    "limit_share",
-)
-KEYS += ("further", "mesh", "ranges", "edge_ranges", "limits")
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """What geometry.cad.cell.mesh_cell is asked for (`settings`, its arguments with their unit); every: n-th
-    designs, from the first, are computed on it, and further ones where it is 1.
+class Numbers(Checked):
+    """The numbers at the top of the file: how many designs, and up to which pressure (over mu) each is
+    followed; limit_share: of a limit load's pressure, where that comes first."""
+
+    designs: int = quantity(None, 250, low=0, high=EDGES)
+    edge_designs: int = quantity(None, 0, low=0, high=EDGES)
+    seed: int = quantity(None, 1, low=0, high=2**31)
+    held_out_every: int = quantity(None, 5, low=2, high=1000)
+    levels: int = quantity(None, 8, low=2, high=100)
+    top_pressure: float = quantity(None, 0.3, key="top_pressure_over_mu", low=1e-3, high=10)
+    limit_share: float = quantity(None, 0.9, low=0.1, high=0.99)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.designs and not self.edge_designs:
+            raise InputError(f"designs = 0 must lie in 1..{EDGES} where edge_designs = 0")
+
+
+KEYS = (*quantities(Numbers), "kinds", "further", "mesh", "ranges", "edge_ranges", "limits")
+
+
+@dataclass(frozen=True)
+class Mesh(Checked):
+    """What geometry.cad.cell.mesh_cell is asked for; every: n-th designs, from the first, are computed on it,
+    and further ones where it is 1.
 
     prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free
     states of designs that are not held out are differentiated by the shape.
     """
 
-    name: str
-    settings: dict[str, float]
-    every: int = 1
-    prescribed: int = 0
-    prescribed_every: int = 1
-    slopes: bool = False
+    name: str = quantity(None)
+    mesh_size: float = quantity("mm", low=0.02, high=20)
+    edge_size: float | None = quantity("mm", None, low=0.02, high=20)
+    every: int = quantity(None, 1, low=1, high=10_000)
+    prescribed: int = quantity(None, 0, low=0, high=PLACES)
+    prescribed_every: int = quantity(None, 1, low=1, high=10_000)
+    slopes: bool = quantity(None, False)
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Arguments of `mesh_cell` with their unit."""
+        return {key: value for key, value in to_table(self).items() if key.endswith("_mm")}
 
     def prescribed_of(self, index: int) -> int:
         """How many prescribed states the design has."""
@@ -82,29 +98,15 @@ def read_campaign(path: str | Path) -> Campaign:
     data, where = read_toml(path), str(path)
     refuse_unknown(data, KEYS, where)
 
-    def value(key, default, low, high, integer=False):
-        v = number(data.get(key, default), key, where, integer=integer)
-        if not low <= v <= high:
-            raise InputError(f"{where}: {key} = {v:g} must lie in {low:g}..{high:g}")
-        return v
-
     kinds = data.get("kinds", list(KINDS))
     if not isinstance(kinds, list) or not kinds or any(k not in KINDS for k in kinds):
         raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting'")
-    edges = value("edge_designs", 0, 0, 100_000, integer=True)
-    count = value("designs", 250, 0 if edges else 1, 100_000, integer=True)
-    seed = value("seed", 1, 0, 2**31, integer=True)
-    held_out_every = value("held_out_every", 5, 2, 1000, integer=True)
-    common = {
-        "levels": value("levels", 8, 2, 100, integer=True),
-        "top_pressure": float(value("top_pressure_over_mu", 0.3, 1e-3, 10)),
-        "limit_share": float(value("limit_share", 0.9, 0.1, 0.99)),
-    }
+    numbers = from_table(Numbers, {key: data[key] for key in quantities(Numbers) if key in data}, where)
+    count, seed, table = numbers.designs, numbers.seed, asdict(numbers)
+    common = {key: table[key] for key in ("levels", "top_pressure", "limit_share")}
     meshes = _meshes(data.get("mesh", [{"name": "coarse", "mesh_size_mm": 2.0}]), where)
     ranges = _ranges(data, "ranges", kinds, where, RANGES)
     edge_ranges = _ranges(data, "edge_ranges", kinds, where, ranges)
-    limits = as_table(data.get("limits", {}), f"{where} [limits]")
-    refuse_unknown(limits, ["time_s", "memory_MB"], f"{where} [limits]")
     further = _further(data, kinds, count, where)
     designs, places = [], max(m.prescribed for m in meshes)
     for kind in kinds:
@@ -113,18 +115,16 @@ def read_campaign(path: str | Path) -> Campaign:
         own = [*range(count), *further[kind]]
         sequences = (
             ("ranges", ranges, own, 0, seed, False),
-            ("edge_ranges", edge_ranges, range(edges), EDGES, seed + EDGE_SEED, True),
+            ("edge_ranges", edge_ranges, range(numbers.edge_designs), EDGES, seed + EDGE_SEED, True),
         )
         for name, box, positions, first, start, at_edges in sequences:
             size = max(positions, default=-1) + 1
-            try:
+            with located(f"{where} [{name}.{kind}]: they hold impossible bodies"):
                 bodies = segments(kind, box[kind], size, start, at_edges)
-            except InputError as error:
-                raise InputError(f"{where} [{name}.{kind}]: they hold impossible bodies: {error}") from None
             states = prescribed_states(kind, size, places, start)
             for position in positions:
                 index = first + position
-                judge = not at_edges and is_held_out(index, held_out_every)
+                judge = not at_edges and is_held_out(index, numbers.held_out_every)
                 for mesh in meshes:
                     if mesh.every == 1 or index % mesh.every == 0 and index < count:
                         settings = common | {"slopes": mesh.slopes and not judge}
@@ -138,25 +138,11 @@ def read_campaign(path: str | Path) -> Campaign:
                         )
                         designs.append(SampledDesign(kind, index, mesh, judge, bodies[position], case))
     designs.sort(key=lambda d: d.index)
-    table = {
-        "designs": count,
-        "edge_designs": edges,
-        "seed": seed,
-        "held_out_every": held_out_every,
-        **common,
-    }
     table["further"] = {kind: len(indices) for kind, indices in further.items()}
     table["edge_ranges"] = {
         k: {name: r for name, r in edge_ranges[k].items() if r != ranges[k][name]} for k in kinds
     }
-    return Campaign(
-        tuple(designs),
-        tuple(kinds),
-        meshes,
-        ranges,
-        Limits(limits.get("time_s", DEFAULT_TIME), limits.get("memory_MB")),
-        table,
-    )
+    return Campaign(tuple(designs), tuple(kinds), meshes, ranges, case_limits(data, where), table)
 
 
 def on_offer(campaign: Campaign, kind: str, count: int) -> list[tuple[int, Segment]]:
@@ -192,36 +178,7 @@ def _case(kind, index, mesh, segment, prescribed, common):
 def _meshes(rows, where):
     if not isinstance(rows, list) or not rows:
         raise InputError(f"{where}: meshes are written [[mesh]], with double brackets")
-    meshes = []
-    for i, row in enumerate(rows, start=1):
-        at = f"{where} [[mesh]] {i}"
-        refuse_unknown(
-            row,
-            ["name", "mesh_size_mm", "edge_size_mm", "every", "prescribed", "prescribed_every", "slopes"],
-            at,
-        )
-        for key in ("name", "mesh_size_mm"):
-            if key not in row:
-                raise InputError(f"{at}: key '{key}' is missing")
-        settings = {}
-        for key in ("mesh_size_mm", "edge_size_mm"):
-            if key in row:
-                settings[key] = float(number(row[key], key, at))
-                if not 0.02 <= row[key] <= 20:
-                    raise InputError(f"{at}: {key} = {row[key]:g} must lie in 0.02..20")
-        counts = []
-        for key, default, low, high in (
-            ("every", 1, 1, 10_000),
-            ("prescribed", 0, 0, PLACES),
-            ("prescribed_every", 1, 1, 10_000),
-        ):
-            counts.append(number(row.get(key, default), key, at, integer=True))
-            if not low <= counts[-1] <= high:
-                raise InputError(f"{at}: {key} = {counts[-1]} must lie in {low}..{high}")
-        slopes = row.get("slopes", False)
-        if not isinstance(slopes, bool):
-            raise InputError(f"{at}: slopes = {slopes!r} must be true or false")
-        meshes.append(Mesh(str(row["name"]), settings, *counts, slopes))
+    meshes = [from_table(Mesh, row, f"{where} [[mesh]] {i}") for i, row in enumerate(rows, start=1)]
     if len({m.name for m in meshes}) < len(meshes):
         raise InputError(f"{where}: two [[mesh]] have the same name")
     return tuple(meshes)

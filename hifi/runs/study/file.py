@@ -8,19 +8,19 @@ can be varied.
 import copy
 import itertools
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, number, read_toml, refuse_unknown
+from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown
 from pneunet.base.materials.laws import LAWS
-from pneunet.base.quantities import quantities
+from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.system.processes import Limits
 from pneunet.geometry.designfile import design_from_tables, design_tables
 from pneunet.geometry.parameters import Segment
 from pneunet.hifi.cell.file import cell_from_tables, cell_tables
-from pneunet.hifi.runs.cases import Case
+from pneunet.hifi.runs.cases import Case, case_limits
 
 BODIES = ("cell", "segment", "manipulator")
 SEGMENT_KEYS = list(quantities(Segment))
@@ -32,9 +32,6 @@ NAMES_OF_MATERIALS = ("silicone", "law")
 #: values at the top of a design.toml and of a CELL.toml, and at that of the latter alone
 COMMON_KEYS = ("pressure_kPa", "mesh_size_mm", "contact")
 CELL_KEYS = (*COMMON_KEYS, "control", "volume_factor")
-DEFAULT_LEVELS = 10
-#: s; one case
-DEFAULT_TIME = 3600.0
 
 
 @dataclass(frozen=True)
@@ -52,13 +49,15 @@ class StudyCase:
 
 
 @dataclass(frozen=True)
-class Study:
-    """cases: StudyCase in order; variables: names of what is varied; limits: of one case."""
+class Study(Checked):
+    """levels: pressures at which each case is recorded; limits: of one case; variables: names of what is
+    varied; cases: in order."""
 
-    kind: str
-    variables: tuple[str, ...]
-    cases: tuple[StudyCase, ...]
-    limits: Limits
+    kind: str = quantity(None, choices=BODIES)
+    levels: int = quantity(None, 10, low=1, high=1000)
+    limits: Limits = Limits()
+    variables: tuple[str, ...] = ()
+    cases: tuple[StudyCase, ...] = ()
 
 
 def read_study(path: str | Path) -> Study:
@@ -75,23 +74,19 @@ def read_study(path: str | Path) -> Study:
         if key not in data:
             raise InputError(f"{where}: key '{key}' is missing: {fix}")
     refuse_unknown(data, ["kind", "base", "levels", "limits", "grid", "case"], where)
-    kind = data["kind"]
-    if kind not in BODIES:
-        raise InputError(f"{where}: kind = {kind!r} is not known: write 'cell', 'segment' or 'manipulator'")
-    base = _base(data["base"], kind, Path(path))
-    levels = number(data.get("levels", base.get("levels", DEFAULT_LEVELS)), "levels", where, integer=True)
-    if not 1 <= levels <= 1000:
-        raise InputError(f"{where}: levels = {levels} must lie in 1..1000")
+    base = _base(data["base"], data["kind"], Path(path))
+    own = {key: tables[key] for tables in (base, data) for key in quantities(Study) if key in tables}
+    study = from_table(Study, own, where, limits=case_limits(data, where))
     listed, grid = _varied(data, base, where)
     cases = []
     for row in listed:
         for combination in itertools.product(*grid.values()):
-            cases.append(_study_case(kind, base, levels, {**row, **dict(zip(grid, combination))}, where))
+            cases.append(_study_case(study, base, {**row, **dict(zip(grid, combination))}, where))
     refused = [case.refusal for case in cases if case.case is None]
     if refused and (not grid or len(refused) == len(cases)):
         raise InputError(refused[0])
     variables = tuple(dict.fromkeys([*(name for row in listed for name in row), *grid]))
-    return Study(kind, variables, tuple(cases), _limits(data.get("limits", {}), f"{where} [limits]"))
+    return replace(study, variables=variables, cases=tuple(cases))
 
 
 def _base(base, kind, path):
@@ -150,9 +145,9 @@ def _flat(table, prefix=""):
     return out
 
 
-def _study_case(kind, base, levels, values, where):
+def _study_case(study, base, values, where):
     try:
-        function, inputs = _inputs(kind, base, levels, values, where)
+        function, inputs = _inputs(study, base, values, where)
     except InputError as error:
         return StudyCase(values, None, str(error))
     # through JSON, so that inputs are what the record on disk will hold
@@ -160,7 +155,7 @@ def _study_case(kind, base, levels, values, where):
     return StudyCase(values, Case(function, inputs, StudyCase(values, None).label))
 
 
-def _inputs(kind, base, levels, values, where):
+def _inputs(study, base, values, where):
     """(function, its complete inputs) of the body with these values."""
     tables = copy.deepcopy(base)
     name = ", ".join(f"{key} = {value}" for key, value in values.items())
@@ -174,12 +169,12 @@ def _inputs(kind, base, levels, values, where):
                 f"{where}: '{name}' leads nowhere in the body; segments are counted from 1,"
                 " segment.1.angle_deg"
             ) from None
-    if kind == "cell":
+    if study.kind == "cell":
         return "hifi.study_cases:solve_cell_case", cell_tables(
-            cell_from_tables({**tables, "levels": levels}, where)
+            cell_from_tables({**tables, "levels": study.levels}, where)
         )
     design = design_from_tables(tables, where)
-    return "hifi.study_cases:solve_design_case", {"design": design_tables(design), "levels": levels}
+    return "hifi.study_cases:solve_design_case", {"design": design_tables(design), "levels": study.levels}
 
 
 def _path(name):
@@ -206,14 +201,6 @@ def _put(table, path, value):
         table[path[0]] = value
     else:
         _put(table.setdefault(path[0], {}), path[1:], value)
-
-
-def _limits(table, where):
-    refuse_unknown(table, ["time_s", "memory_MB"], where)
-    for key, value in table.items():
-        if not number(value, key, where) > 0:
-            raise InputError(f"{where}: {key} = {value:g} must be larger than 0")
-    return Limits(table.get("time_s", DEFAULT_TIME), table.get("memory_MB"))
 
 
 def value_of(name: str, study_case: StudyCase, default: object = "") -> Any:
