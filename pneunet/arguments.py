@@ -4,6 +4,7 @@ import argparse
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NoReturn
 
 from pneunet.base.errors import InputError
 
@@ -16,7 +17,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options):
         super().__init__(**options, allow_abbrev=False)
 
-    def error(self, message: str):
+    def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} ({self.prog} --help tells more)")
 
 

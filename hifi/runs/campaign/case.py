@@ -10,6 +10,7 @@ Everything is in mm and MPa with mu = 1 MPa.
 import json
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -45,7 +46,7 @@ class _Enough(Exception):
     """The scout has seen the pressures it was sent for."""
 
 
-def solve_campaign_case(inputs, directory):
+def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     """Case of hifi.runs.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure",
     "limit_share", "prescribed", "slopes": whether free states are differentiated by the shape}.
 
@@ -90,7 +91,7 @@ class Sampler:
         self.kept = []  # (CellState, state array) of the free states
         self.states = []  # what states.json says
 
-    def scout(self, top, share):
+    def scout(self, top: float, share: float) -> tuple[float, float | None]:
         """(top pressure, limit pressure or None), MPa: `top`, or `share` of the limit load where that is
         less."""
         system, limit = self.system, None
@@ -131,7 +132,7 @@ class Sampler:
         last = path.accepted[-1]
         return replace(last, parameter=last.load)
 
-    def free(self, levels):
+    def free(self, levels: np.ndarray) -> None:
         """Record the free states at increasing pressures (n,), MPa."""
         system = self.system
         crest = int(np.argmax([a.load for a in self.walked]))
@@ -193,7 +194,7 @@ class Sampler:
             {} if stiffness is None else {"stiffness_slopes": stiffness.tolist()}
         )
 
-    def prescribed(self, wanted):
+    def prescribed(self, wanted: list[dict]) -> list[str]:
         """Record the states of `wanted` ([{"level", "amplitude", "direction"}]); returns why some are missing
         (n,) texts."""
         missing = []
@@ -222,7 +223,7 @@ class Sampler:
             system.destroy()
 
 
-def first_touch(states):
+def first_touch(states: list[dict]) -> float | None:
     """Pressure (MPa) at which walls touch on the way through the free states (hifi.contact.touch); None where
     they do not."""
     watch, met = TouchWatch(), None
@@ -234,7 +235,9 @@ def first_touch(states):
     return met and met.pressure
 
 
-def prescribed_change(q, stiffness, amplitude, direction):
+def prescribed_change(
+    q: np.ndarray, stiffness: np.ndarray, amplitude: float, direction: list[float] | None
+) -> np.ndarray:
     """(6,) strains from the free ones q to the prescribed ones: see hifi.runs.campaign.sample.Prescribed."""
     if direction is None:
         return (amplitude - 1) * (q - REST)
