@@ -40,12 +40,13 @@ class Allowed:
         numeric = isinstance(value, Real)
         if not numeric:
             return "must be a number"
+        hint = f": {self.hint}" if self.hint else ""
         if self.above > -math.inf and not value > self.above:
-            return f"must be larger than {self.above:g}"
+            return f"must be larger than {self.above:g}" + hint * (self.low == -math.inf)
         if self.high == math.inf:
             return f"must be at least {self.low:g}"
         words = f" {unit.replace('_per_', '/').replace('_', ' ')}" if unit else ""
-        return f"must lie in {self.low:g}..{self.high:g}{words}" + (f": {self.hint}" if self.hint else "")
+        return f"must lie in {self.low:g}..{self.high:g}{words}{hint}"
 
 
 def listed(choices: tuple) -> str:

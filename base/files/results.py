@@ -53,7 +53,8 @@ def read_run(directory: str | Path) -> Results:
 
     InputError where there is neither.
     """
-    directory, record, tables = Path(directory), {}, {}
+    directory, tables = Path(directory), {}
+    record: dict = {}
     for name in ("", *PARTS):
         folder = directory / name
         for path in sorted(folder.glob("*.csv")):
@@ -68,6 +69,6 @@ def read_run(directory: str | Path) -> Results:
 
 def _json(path):
     try:
-        return json.loads(path.read_text())
+        return json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
         raise InputError(f"{path}: cannot be read as JSON ({error})") from None

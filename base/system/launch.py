@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from pneunet.base.system.doorman import end_with_parent
 from pneunet.base.system.log import RANK_VARIABLES
@@ -118,5 +119,6 @@ def rank_map() -> Iterator[Callable | None]:
     if MPI.COMM_WORLD.size == 1:
         yield map
         return
+    executor: Any
     with MPICommExecutor(MPI.COMM_WORLD, root=0) as executor:
         yield executor and executor.map

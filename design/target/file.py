@@ -3,6 +3,7 @@
 Every bad input is one line that names the key and the fix.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,11 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_csv
 from pneunet.base.files.schemas import TARGET
-from pneunet.base.files.toml import number, read_toml, refuse_unknown
+from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
-from pneunet.base.quantities import quantities
+from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.strains import helix_frenet
-from pneunet.base.units import MPA_PER_KPA, PER_MM_PER_M
+from pneunet.base.units import MPA_PER_KPA
 from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, TWISTING, Piece, Target
 from pneunet.geometry.parameters import Segment
 
@@ -249,44 +250,36 @@ def _pieces(rows, where):
     return tuple(_piece(row, f"{where} [[piece]] {i}") for i, row in enumerate(rows, start=1))
 
 
+@dataclass(frozen=True)
+class _Given(Checked):
+    """What a [[piece]] may say; PIECE_KEYS: the keys that go with its kind."""
+
+    kind: str = quantity(None, choices=tuple(PIECE_KEYS))
+    length: float = quantity("mm", note="deformed length", above=0)
+    twist: float | None = quantity("rad_per_mm", None, key="tau_rad_per_mm")
+    curvature: float | None = quantity("per_m", None, above=0, hint="its direction follows from the points")
+    torsion: float | None = quantity("rad_per_m", None)
+    cylinder_curvature: float | None = quantity("per_m", None, above=0)
+    pitch: float | None = quantity("mm", None)
+
+
 def _piece(row, where):
-    kind = row.get("kind")
-    if kind not in PIECE_KEYS:
-        raise InputError(f"{where}: kind = {kind!r} is not known: write 'twisting', 'bending' or 'helical'")
-    refuse_unknown(row, PIECE_KEYS[kind], where)
-    if "length_mm" not in row:
-        raise InputError(f"{where}: key 'length_mm' is missing (deformed length)")
-    value = {key: number(v, key, where) for key, v in row.items() if key != "kind"}
-    if value["length_mm"] <= 0:
-        raise InputError(f"{where}: length_mm = {value['length_mm']:g} must be larger than 0")
-    twist, curvature = value.get("tau_rad_per_mm"), value.get("curvature_per_m")
-    curvature = None if curvature is None else curvature * PER_MM_PER_M
-    if kind == HELICAL:
-        curvature, twist = _helix(value, curvature, where)
-    if curvature is not None and curvature <= 0:
-        raise InputError(
-            f"{where}: a curvature must be larger than 0 (its direction follows from the points)"
-        )
-    return Piece(kind, float(value["length_mm"]), twist, curvature)
+    given = from_table(_Given, row, where)
+    refuse_unknown(row, PIECE_KEYS[given.kind], where)
+    curvature, twist = (given.curvature, given.twist) if given.kind != HELICAL else _helix(given, where)
+    return Piece(given.kind, given.length, twist, curvature)
 
 
-def _helix(value, curvature, where):
+def _helix(given, where):
     """Frenet curvature and torsion from either pair of givens, (None, None) without."""
-    cylinder, frenet = ("cylinder_curvature_per_m", "pitch_mm"), ("curvature_per_m", "torsion_rad_per_m")
-    given = [key for key in cylinder + frenet if key in value]
-    if not given:
-        return None, None
-    if set(given) == set(cylinder):
-        if value[cylinder[0]] <= 0:
-            raise InputError(
-                f"{where}: cylinder_curvature_per_m = {value[cylinder[0]]:g} must be larger than 0"
-            )
-        return helix_frenet(value[cylinder[0]] * PER_MM_PER_M, value["pitch_mm"])
-    if set(given) == set(frenet):
-        return curvature, value["torsion_rad_per_m"] * PER_MM_PER_M
+    cylinder, frenet = (given.cylinder_curvature, given.pitch), (given.curvature, given.torsion)
+    if cylinder == (None, None) and (None not in frenet or frenet == cylinder):
+        return frenet
+    if frenet == (None, None) and None not in cylinder:
+        return helix_frenet(*cylinder)
     raise InputError(
-        f"{where}: a helix is given by {' and '.join(cylinder)}, or by {' and '.join(frenet)} (Frenet), or"
-        " not at all"
+        f"{where}: a helix is given by cylinder_curvature_per_m and pitch_mm, or by curvature_per_m and"
+        " torsion_rad_per_m (Frenet), or not at all"
     )
 
 

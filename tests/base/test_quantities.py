@@ -15,7 +15,7 @@ class Valve(Checked):
     pressure: float = quantity("kPa", 0.02, low=0, high=2000, hint="is it in Pa?")
     bore: float = quantity("mm", 1.0, above=0, low=0.05, high=50)
     turns: int = quantity(None, 2, low=1)
-    lift: float = quantity("percent", 1.0, above=0)
+    lift: float = quantity("percent", 1.0, above=0, hint="it opens upwards")
     kind: str = quantity(None, "ball", choices=("ball", "needle", "gate"))
     seconds: float | None = quantity("s", None, key="time_s", above=0)
     tight: bool = quantity(None, True)
@@ -31,7 +31,7 @@ REFUSED = {
     "nan": ({"bore": float("nan")}, "bore_mm = nan must be larger than 0"),
     "text": ({"bore": "1"}, "bore_mm = '1' must be a number"),
     "count": ({"turns": 0}, "turns = 0 must be at least 1"),
-    "percent": ({"lift": -0.1}, "lift_percent = -10 must be larger than 0"),
+    "percent": ({"lift": -0.1}, "lift_percent = -10 must be larger than 0: it opens upwards"),
     "choice": ({"kind": "cock"}, "kind = 'cock' is not known: write 'ball', 'needle' or 'gate'"),
     "no choice": ({"kind": None}, "kind = None is not known: write 'ball', 'needle' or 'gate'"),
     "key": ({"seconds": 0.0}, "time_s = 0 must be larger than 0"),
