@@ -17,7 +17,9 @@ def house():
     """The four figures of the code."""
     bare, ours = (median(_milliseconds(code) for _ in range(9)) for code in ("pass", "import pneunet"))
     types = _run("-m", "tests.typecheck")
-    wheel = _run("-m", "pytest", "-q", "tests/test_packaging.py", PNEUNET_WHEEL_TARGET=TARGET)
+    wheel = _run(
+        "-m", "pytest", "-q", "--timeout=3600", "tests/test_packaging.py", PNEUNET_WHEEL_TARGET=TARGET
+    )
     if wheel.returncode:
         print(wheel.stdout)
     return {

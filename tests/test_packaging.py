@@ -57,7 +57,7 @@ for name in ("fcntl", "resource", "termios", "pwd", "grp"):
 def run(*command, cwd, code=0):
     """The finished process of a command that must end with this exit code."""
     line = [str(word) for word in command]
-    done = subprocess.run(line, cwd=cwd, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(line, cwd=cwd, capture_output=True, text=True)
     assert done.returncode == code, f"{line}\n{done.stdout}\n{done.stderr}"
     return done
 
