@@ -2,12 +2,13 @@
 it."""
 
 import logging
-from collections.abc import Collection
+from collections.abc import Iterable
+from math import inf, isfinite
 from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError, located
+from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path, output_directory, write_text
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
@@ -18,6 +19,8 @@ from pneunet.base.units import KPA_PER_MPA
 
 log = logging.getLogger(__name__)
 
+#: engineering strain that walls of pneu-nets seldom pass
+USUAL_STRAIN = 1.5
 #: laws that fit worse than this (relative) have no say in how uncertain the equibiaxial response is
 CREDIBLE = 0.1
 
@@ -27,23 +30,29 @@ def run_fit(
     law: str = "all",
     directory: str | Path | None = None,
     stress_unit: str | None = None,
-    largest_strain: float = np.inf,
+    largest_strain: float | None = None,
+    gauge_length: float | None = None,
 ) -> Fit:
     """Fit `law` (a name of base.materials.laws.LAWS, any case, or "all") to the tests in `path`; returns the
     chosen Fit.
 
     Writes material.toml and fit.png to `directory` (default out/fit-STEM). largest_strain: fit no further
-    than this engineering strain. With "all" the least error without instability is chosen.
+    than this engineering strain; None or inf: USUAL_STRAIN. gauge_length: mm, for elongations in mm. With
+    "all" the least error without instability is chosen.
     """
     path = Path(path)
     names = {name.lower(): name for name in LAWS}
     if law.lower() not in (*names, "all"):
         raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
-    specimens = read_tensile(path, stress_unit)
-    with located(path):
-        tests = TensileData(specimens, largest_strain)
+    usual = largest_strain is None or not isfinite(largest_strain)
+    specimens = read_tensile(path, stress_unit, gauge_length)
+    try:
+        tests = TensileData(specimens, USUAL_STRAIN if usual else largest_strain)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     directory = output_directory(directory or Path("out") / f"fit-{path.stem}")
-    elongation = min(float(s.stretch[-1]) for s in specimens) - 1
+    elongation = min((float(s.stretch[-1]) - 1 for s in specimens if s.broke), default=inf)
+    reached = max(float(s.stretch[-1]) for s in specimens) - 1
     common = {
         "elongation_at_break": elongation,
         "name": path.stem,
@@ -64,9 +73,11 @@ def run_fit(
     shown = list(fits.values()) if law.lower() == "all" else [chosen]
     draw(directory / "fit.png", path.stem, specimens, tests, shown, chosen, credible)
     count = f"{len(specimens)} specimen{'s' * (len(specimens) > 1)}"
+    choice = ", what pneu-nets see (--to-strain-percent for another range)" if usual else ""
+    seen = "at" if isfinite(elongation) else "not seen, at least"
     log.info(
-        f"{path.name}: {count}, fitted to stretch {tests.largest:.2f}, break at {100 * elongation:.0f} %"
-        " strain"
+        f"{path.name}: {count}, fitted to {100 * (tests.largest - 1):.0f} % strain{choice};"
+        f" break {seen} {100 * min(elongation, reached):.0f} %"
     )
     for f in shown:
         log.info(
@@ -74,12 +85,7 @@ def run_fit(
             f" {parameters(f.material)}"
         )
     for warning in chosen.warnings:
-        log.warning(f"warning: {warning}")
-    if not any(s.broke for s in specimens):
-        log.warning(
-            "warning: no fall of the stress is seen: if the test stopped before break, take"
-            " elongation_at_break_percent out"
-        )
+        log.warning("warning: %s", warning)
     log.warning(
         f"warning: uniaxial data alone: at equibiaxial stretch {stretch:.2g} the {len(credible)} laws that"
         f" fit predict {low:.4g}..{high:.4g} MPa"
@@ -88,9 +94,10 @@ def run_fit(
     return chosen
 
 
-def best(fits: Collection[Fit]) -> Fit:
+def best(fits: Iterable[Fit]) -> Fit:
     """Least error among fits that are stable and likely in equibiaxial tension; among all if there is
     none."""
+    fits = list(fits)
     stable = [f for f in fits if not any(w.startswith(("unstable", "unlikely")) for w in f.warnings)]
     return min(stable or fits, key=lambda f: f.error)
 
@@ -130,7 +137,7 @@ def draw(
         fitted.plot(s.stretch[near], s.stress[near], ".", color="0.6", markersize=3)
     fitted.plot([], [], ".", color="0.6", label="test")
 
-    def style(f: Fit) -> dict:
+    def style(f):
         i = list(LAWS).index(f.material.law)
         # dashed in turn: a law may hide another that it contains
         return {
