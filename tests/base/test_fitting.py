@@ -10,12 +10,8 @@ from pneunet.base.materials.fit_run import run_fit
 from pneunet.base.materials.fitting import TensileData, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
 from pneunet.base.materials.laws import LAWS, Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh, material_from_table
-<<<<<<< HEAD
-from pneunet.base.materials.tensile import Specimen, read_tensile
-from tests.toy_law import Demiray
-=======
 from pneunet.base.materials.tensile import Specimen
->>>>>>> 2b6fe93 (Tensile tests of strangers: columns by what their names say, first loading of cycles, no break that was not seen; fits to 150 % strain unless told otherwise)
+from tests.toy_law import Demiray
 
 
 def measured(material, largest=3.0, noise=0.0, points=150):
