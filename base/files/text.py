@@ -80,7 +80,7 @@ def _read_bytes(path):
 
 @dataclass(eq=False)
 class Table:
-    """Rows of numbers under one header, as cells without surrounding blanks.
+    """Rows of numbers under one header, as cells with single blanks between words.
 
     header: names of the columns, () where there are none; units: from a row of their own, "" without; rows:
     cells up to the last one that is filled; lines: the row in the file of every one of them, counted from 1.
@@ -170,7 +170,7 @@ def _rows(path, text, delimiter) -> Iterator[tuple[int, list[str]]]:
                 raise InputError(f"{path}: has over {MOST_ROWS} rows: thin it out")
             if max(map(len, row), default=0) > LONGEST_CELL:
                 raise csv.Error
-            cells = [cell.strip() for cell in row]
+            cells = [" ".join(cell.split()) for cell in row]
             while len(cells) > 1 and not cells[-1]:
                 cells.pop()
             yield start, cells

@@ -2,14 +2,13 @@
 it."""
 
 import logging
-from collections.abc import Iterable
 from math import inf, isfinite
 from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import atomic_path, output_directory, write_text
+from pneunet.base.files.atomic import atomic_path, output_directory, require_writable, write_text
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
@@ -21,6 +20,8 @@ log = logging.getLogger(__name__)
 
 #: engineering strain that walls of pneu-nets seldom pass
 USUAL_STRAIN = 1.5
+#: no test tells fits with smaller errors (relative) apart
+RESOLVED = 1e-3
 #: laws that fit worse than this (relative) have no say in how uncertain the equibiaxial response is
 CREDIBLE = 0.1
 
@@ -50,7 +51,8 @@ def run_fit(
         tests = TensileData(specimens, USUAL_STRAIN if usual else largest_strain)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    directory = output_directory(directory or Path("out") / f"fit-{path.stem}")
+    directory = Path(directory or Path("out") / f"fit-{path.stem}")
+    require_writable(directory)
     elongation = min((float(s.stretch[-1]) - 1 for s in specimens if s.broke), default=inf)
     reached = max(float(s.stretch[-1]) for s in specimens) - 1
     common = {
@@ -58,19 +60,22 @@ def run_fit(
         "name": path.stem,
         "source": f"pneunet fit-material {path.name}: uniaxial to stretch {tests.largest:.3g}",
     }
-    fits = {}
+    fits, refused = {}, {}
     for name in LAWS:
         try:
             fits[name] = fit(name, tests, **common)
         except InputError as error:
-            if law.lower() == name.lower():
-                raise InputError(f"{path}: no usable law comes out ({error})") from None
-    chosen = fits[names[law.lower()]] if law.lower() != "all" else best(fits.values())
+            refused[name] = error
+    wanted = list(LAWS) if law.lower() == "all" else [names[law.lower()]]
+    shown = [fits[name] for name in wanted if name in fits]
+    if not shown:
+        raise InputError(f"{path}: no usable law comes out ({refused[wanted[0]]})")
+    chosen = best(shown)
+    directory = output_directory(directory)
     write_text(directory / "material.toml", toml_text({"material": material_to_table(chosen.material)}))
     credible = [f for f in fits.values() if f is chosen or f.error < CREDIBLE]
     stretch = min(2.0, tests.largest)
     low, high = biaxial_spread(credible, stretch)
-    shown = list(fits.values()) if law.lower() == "all" else [chosen]
     draw(directory / "fit.png", path.stem, specimens, tests, shown, chosen, credible)
     count = f"{len(specimens)} specimen{'s' * (len(specimens) > 1)}"
     choice = ", what pneu-nets see (--to-strain-percent for another range)" if usual else ""
@@ -94,12 +99,11 @@ def run_fit(
     return chosen
 
 
-def best(fits: Iterable[Fit]) -> Fit:
-    """Least error among fits that are stable and likely in equibiaxial tension; among all if there is
-    none."""
-    fits = list(fits)
+def best(fits: list[Fit]) -> Fit:
+    """Least error among fits that are stable and likely in equibiaxial tension, among all if there is none;
+    the first of those that a test cannot tell apart."""
     stable = [f for f in fits if not any(w.startswith(("unstable", "unlikely")) for w in f.warnings)]
-    return min(stable or fits, key=lambda f: f.error)
+    return min(stable or fits, key=lambda f: max(f.error, RESOLVED))
 
 
 def parameters(material: Hyperelastic) -> str:

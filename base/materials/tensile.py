@@ -66,7 +66,7 @@ def read_tensile(
     """The specimens of a file. stress_unit ("kPa", ...) serves where the header names none. With gauge_length
     (mm) strains are elongations over it. InputError for anything unclear."""
     table = read_numbers_table(path)
-    names = [f"{name} {unit}".strip() for name, unit in zip(table.header, table.units)]
+    names = [f"{name[:80]} {unit[:20]}".strip() for name, unit in zip(table.header, table.units)]
     specimens = []
     for strain_column, stress_column in _pairs(path, names, gauge_length):
         name = names[strain_column]
@@ -74,12 +74,14 @@ def read_tensile(
         y = table.numbers(stress_column, gaps=True) * _stress_factor(path, names[stress_column], stress_unit)
         known = np.isfinite(x) & np.isfinite(y)
         strain = x[known] - (1.0 if _kind(name) == "stretch" else 0.0)
-        if len(strain) and strain.max() > LARGEST_STRAIN:
+        if len(strain) == 0:
+            continue
+        if strain.max() > LARGEST_STRAIN:
             raise InputError(
                 f"{path}: '{name}' reaches {strain.max():g}: if these are percent, name the column"
                 " strain_percent"
             )
-        if len(strain) and strain.max() <= 0:
+        if strain.max() <= 0:
             raise InputError(f"{path}: '{name}' is nowhere above 0: only tension is fitted, no compression")
         specimens += _specimens(strain, y[known])
     if not specimens:

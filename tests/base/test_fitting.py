@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.toml import read_toml
 from pneunet.base.materials.fit_run import run_fit
 from pneunet.base.materials.fitting import TensileData, fit
@@ -115,3 +116,27 @@ def test_a_break_is_written_only_where_it_is_seen(tmp_path):
         assert material.elongation_at_break == pytest.approx(elongation)
         written = read_toml(tmp_path / "fit" / "material.toml")["material"]
         assert ("elongation_at_break_percent" in written) == bool(line)
+
+
+def test_a_law_with_more_parameters_is_not_chosen_for_its_fit_of_rounded_numbers(tmp_path):
+    pytest.importorskip("matplotlib")
+    specimen = measured(NeoHookean(0.1), 2.5, points=12)
+    rounded = Specimen(specimen.stretch, specimen.stress.round(4), False)
+    material = run_fit(write(tmp_path / "test.csv", rounded), directory=tmp_path / "fit").material
+    assert material.law == "neo-Hookean" and material.mu == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.mark.parametrize("law", ["all", "Gent"])
+def test_no_usable_law_is_said_in_one_line_and_leaves_nothing(tmp_path, law):
+    wrong_unit = measured(NeoHookean(100.0), 2.5)
+    wrong_unit = Specimen(wrong_unit.stretch, 1e3 * wrong_unit.stress, False)
+    with pytest.raises(InputError, match=r"test.csv: no usable law comes out \(.*is it in kPa") as error:
+        run_fit(write(tmp_path / "test.csv", wrong_unit), law, tmp_path / "fit")
+    assert "\n" not in str(error.value) and not (tmp_path / "fit").exists()
+
+
+def test_a_law_that_has_locked_is_no_obstacle(tmp_path, caplog):
+    pytest.importorskip("matplotlib")
+    path = write(tmp_path / "test.csv", measured(Gent(0.1, 3.0), 2.25))
+    assert run_fit(path, "Gent", tmp_path / "fit").material.jm == pytest.approx(3.0, rel=0.01)
+    assert "predict " in caplog.text
