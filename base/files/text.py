@@ -26,7 +26,7 @@ MOST_ROWS = 200_000
 #: so much of a file is looked at to find its dialect, characters
 SAMPLE = 200_000
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
-_BARE = ((), ())  # neither header nor units
+_BARE: tuple[tuple, tuple] = ((), ())  # neither header nor units
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _UNIT = re.compile(
     r"[(\[].*[)\]]|%|-|[kMG]?Pa|k?N|[cm]?m|s|sec|min|psi|ksi|°C|(N|kgf|mm|m)/([cm]?m|in)\^?[²2]?"
@@ -191,13 +191,15 @@ def _largest_table(path, rows):
     another header follows."""
     tables: dict[tuple, Table] = {}
     sizes: Counter = Counter()
-    table, above, empty, last = None, [], [], 0
+    table, last = Table(path), 0
+    above: list[list[str]] = []
+    empty: list[tuple[int, list[str]]] = []
     for line, row in rows:
         numbers, filled = _count(row)
         if filled and not numbers and (len(row) != last or tuple(row) == table.header):
             above, empty, last = [*above, row], [], 0
         elif filled:
-            key = _header(above, row) if above or table is None else _BARE
+            key = _header(above, row)
             if (
                 table is None or key != _BARE or len(row) != table.width and above
             ):  # a title alone starts none

@@ -185,7 +185,8 @@ def _specimens(strain, stress):
             starts.append(k)
             jumped.append(jumps)
             reached = 0.0
-    strips, whole = [], False
+    whole = False
+    strips: list[tuple[list[slice], list[bool]]] = []
     for a, b, jumps in zip(starts, [*starts[1:], len(strain)], jumped):
         end, broke = _loading_end(strain[a:b], stress[a:b])
         if jumps or not whole:
