@@ -100,7 +100,7 @@ class Table:
     @property
     def width(self) -> int:
         """Number of columns."""
-        return len(self.header) or len(self.rows[0])
+        return len(self.header) or max(map(len, self.rows))
 
     def index(self, name: str) -> int:
         """The place of the one column of this name; InputError when it is missing or there twice."""
@@ -134,10 +134,11 @@ def read_numbers_table(path: str | Path) -> Table:
     text = read_text(path)
     delimiter = max(",;\t", key=lambda one: _consistency(text[:SAMPLE], one))
     table = _largest_table(path, _rows(path, text, delimiter))
+    width = table.width
     for row, line in zip(table.rows, table.lines):
-        if len(row) > table.width:
+        if len(row) > width:
             hint = ": with decimal commas, save it with semicolons between the columns" * (delimiter == ",")
-            raise InputError(f"{path} row {line}: {len(row)} cells in {table.width} columns{hint}")
+            raise InputError(f"{path} row {line}: {len(row)} cells in {width} columns{hint}")
     _refuse_two_decimal_signs(table)
     return table
 
@@ -200,9 +201,8 @@ def _largest_table(path, rows):
             above, empty, last = [*above, row], [], 0
         elif filled:
             key = _header(above, row)
-            if (
-                table is None or key != _BARE or len(row) != table.width and above
-            ):  # a title alone starts none
+            # a title alone starts no table
+            if not table.rows or key != _BARE or above and len(row) != len(table.header or table.rows[-1]):
                 table = tables.setdefault(key, Table(path, *key))
             for number, cells in [*empty, (line, row)]:
                 table.lines.append(number)
