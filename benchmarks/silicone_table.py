@@ -61,6 +61,8 @@ def rows(materials):
 
 
 def main(folder):
+    if not list(Path(folder).glob("*.csv")):
+        sys.exit(f"{folder or 'DATA'}: no CSV files of tensile tests: make silicones DATA=FOLDER")
     materials = {path.stem: fitted(path) for path in sorted(Path(folder).glob("*.csv"))}
     quoted = {f'"{name}"': keys for name, keys in materials.items()}
     write_text(TABLE, HEAD + toml_text(quoted))
@@ -70,4 +72,4 @@ def main(folder):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main(sys.argv[1])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError
+from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import atomic_path, output_directory, require_writable, write_text
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
@@ -45,12 +45,13 @@ def run_fit(
     names = {name.lower(): name for name in LAWS}
     if law.lower() not in (*names, "all"):
         raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
-    usual = largest_strain is None or not isfinite(largest_strain)
+    choice = ""
+    if largest_strain is None or not isfinite(largest_strain):
+        largest_strain = USUAL_STRAIN
+        choice = ", what pneu-nets see (--to-strain-percent for another range)"
     specimens = read_tensile(path, stress_unit, gauge_length)
-    try:
-        tests = TensileData(specimens, USUAL_STRAIN if usual else largest_strain)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    with located(path):
+        tests = TensileData(specimens, largest_strain)
     directory = Path(directory or Path("out") / f"fit-{path.stem}")
     require_writable(directory)
     elongation = min((float(s.stretch[-1]) - 1 for s in specimens if s.broke), default=inf)
@@ -78,7 +79,6 @@ def run_fit(
     low, high = biaxial_spread(credible, stretch)
     draw(directory / "fit.png", path.stem, specimens, tests, shown, chosen, credible)
     count = f"{len(specimens)} specimen{'s' * (len(specimens) > 1)}"
-    choice = ", what pneu-nets see (--to-strain-percent for another range)" if usual else ""
     seen = "at" if isfinite(elongation) else "not seen, at least"
     log.info(
         f"{path.name}: {count}, fitted to {100 * (tests.largest - 1):.0f} % strain{choice};"
