@@ -7,7 +7,7 @@ RANKS := 2
 export OMP_NUM_THREADS := 1
 export HWLOC_HIDE_ERRORS := 2
 
-.PHONY: help setup demo test types bench idea image image-test clean
+.PHONY: help setup demo test types bench silicones idea image image-test clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
@@ -30,6 +30,9 @@ bench: setup ## measure the figures (ONLY=part for one part)
 
 idea: setup ## the README's picture of the idea (after `make demo`)
 	$(VENV)/python -m examples.idea
+
+silicones: setup ## the table of silicones from tensile tests (DATA=folder)
+	$(VENV)/python -m benchmarks.silicone_table "$(DATA)"
 
 image: ## container image `pneunet` (podman, docker or buildah)
 	@containers/build.sh

@@ -70,6 +70,7 @@ PARTS = {
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
     ),
+    "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "remeshed": (
         remeshed.remeshed,
         "held-out cells on another mesh of the same size, against the law's errors; some 15 minutes",

@@ -80,6 +80,11 @@ def strain_percent(text: str) -> float:
     return _number(text, math.ulp(0.0), math.inf, "larger than 0")
 
 
+def gauge_length(text: str) -> float:
+    """mm"""
+    return _number(text, 0.1, 1e4, "in 0.1..1e4")
+
+
 def whole(text: str) -> int:
     """1 to 20000"""
     if not text.isdecimal() or not 0 < int(text) <= 20_000:
@@ -197,9 +202,11 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("test", type=Path, metavar="TENSILE.csv")
     text = "neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them"
     a("--law", default="all", help=text)
-    a("--stress-unit", help="where the file names none: MPa, kPa, Pa, psi")
-    text = "fit no further than this"
+    a("--stress-unit", help="where the file names none: MPa, kPa, Pa, psi, ...")
+    text = "fit no further than this (default 150, what pneu-nets see)"
     a("--to-strain-percent", type=strain_percent, default=math.inf, metavar="200", help=text)
+    text = "length that elongations in mm are of: strain is elongation over it"
+    a("--gauge-length-mm", type=gauge_length, metavar="33", help=text)
     add_output(a, "out/fit-NAME of the test")
 
     a = add("run", "start a pneunet command (or, after --, any program) on N MPI ranks")

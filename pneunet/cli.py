@@ -93,7 +93,7 @@ def report(a: Namespace) -> None:
 def fit_material(a: Namespace) -> None:
     from pneunet.base.materials.fit_run import run_fit
 
-    run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100)
+    run_fit(a.test, a.law, a.output, a.stress_unit, a.to_strain_percent / 100, a.gauge_length_mm)
 
 
 def run(a: Namespace) -> int:

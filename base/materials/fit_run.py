@@ -2,13 +2,13 @@
 it."""
 
 import logging
-from collections.abc import Collection
+from math import inf, isfinite
 from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.errors import InputError, located
-from pneunet.base.files.atomic import atomic_path, output_directory, write_text
+from pneunet.base.files.atomic import atomic_path, output_directory, require_writable, write_text
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
@@ -18,6 +18,10 @@ from pneunet.base.units import KPA_PER_MPA
 
 log = logging.getLogger(__name__)
 
+#: engineering strain that walls of pneu-nets seldom pass
+USUAL_STRAIN = 1.5
+#: no test tells fits with smaller errors (relative) apart
+RESOLVED = 1e-3
 #: laws that fit worse than this (relative) have no say in how uncertain the equibiaxial response is
 CREDIBLE = 0.1
 
@@ -27,46 +31,58 @@ def run_fit(
     law: str = "all",
     directory: str | Path | None = None,
     stress_unit: str | None = None,
-    largest_strain: float = np.inf,
+    largest_strain: float | None = None,
+    gauge_length: float | None = None,
 ) -> Fit:
     """Fit `law` (a name of base.materials.laws.LAWS, any case, or "all") to the tests in `path`; returns the
     chosen Fit.
 
     Writes material.toml and fit.png to `directory` (default out/fit-STEM). largest_strain: fit no further
-    than this engineering strain. With "all" the least error without instability is chosen.
+    than this engineering strain; None or inf: USUAL_STRAIN. gauge_length: mm, for elongations in mm. With
+    "all" the least error without instability is chosen.
     """
     path = Path(path)
     names = {name.lower(): name for name in LAWS}
     if law.lower() not in (*names, "all"):
         raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
-    specimens = read_tensile(path, stress_unit)
+    choice = ""
+    if largest_strain is None or not isfinite(largest_strain):
+        largest_strain = USUAL_STRAIN
+        choice = ", what pneu-nets see (--to-strain-percent for another range)"
+    specimens = read_tensile(path, stress_unit, gauge_length)
     with located(path):
         tests = TensileData(specimens, largest_strain)
-    directory = output_directory(directory or Path("out") / f"fit-{path.stem}")
-    elongation = min(float(s.stretch[-1]) for s in specimens) - 1
+    directory = Path(directory or Path("out") / f"fit-{path.stem}")
+    require_writable(directory)
+    elongation = min((float(s.stretch[-1]) - 1 for s in specimens if s.broke), default=inf)
+    reached = max(float(s.stretch[-1]) for s in specimens) - 1
     common = {
         "elongation_at_break": elongation,
         "name": path.stem,
         "source": f"pneunet fit-material {path.name}: uniaxial to stretch {tests.largest:.3g}",
     }
-    fits = {}
+    fits, refused = {}, {}
     for name in LAWS:
         try:
             fits[name] = fit(name, tests, **common)
         except InputError as error:
-            if law.lower() == name.lower():
-                raise InputError(f"{path}: no usable law comes out ({error})") from None
-    chosen = fits[names[law.lower()]] if law.lower() != "all" else best(fits.values())
+            refused[name] = error
+    wanted = list(LAWS) if law.lower() == "all" else [names[law.lower()]]
+    shown = [fits[name] for name in wanted if name in fits]
+    if not shown:
+        raise InputError(f"{path}: no usable law comes out ({refused[wanted[0]]})")
+    chosen = best(shown)
+    directory = output_directory(directory)
     write_text(directory / "material.toml", toml_text({"material": material_to_table(chosen.material)}))
     credible = [f for f in fits.values() if f is chosen or f.error < CREDIBLE]
     stretch = min(2.0, tests.largest)
     low, high = biaxial_spread(credible, stretch)
-    shown = list(fits.values()) if law.lower() == "all" else [chosen]
     draw(directory / "fit.png", path.stem, specimens, tests, shown, chosen, credible)
     count = f"{len(specimens)} specimen{'s' * (len(specimens) > 1)}"
+    seen = "at" if isfinite(elongation) else "not seen, at least"
     log.info(
-        f"{path.name}: {count}, fitted to stretch {tests.largest:.2f}, break at {100 * elongation:.0f} %"
-        " strain"
+        f"{path.name}: {count}, fitted to {100 * (tests.largest - 1):.0f} % strain{choice};"
+        f" break {seen} {100 * min(elongation, reached):.0f} %"
     )
     for f in shown:
         log.info(
@@ -74,12 +90,7 @@ def run_fit(
             f" {parameters(f.material)}"
         )
     for warning in chosen.warnings:
-        log.warning(f"warning: {warning}")
-    if not any(s.broke for s in specimens):
-        log.warning(
-            "warning: no fall of the stress is seen: if the test stopped before break, take"
-            " elongation_at_break_percent out"
-        )
+        log.warning("warning: %s", warning)
     log.warning(
         f"warning: uniaxial data alone: at equibiaxial stretch {stretch:.2g} the {len(credible)} laws that"
         f" fit predict {low:.4g}..{high:.4g} MPa"
@@ -88,11 +99,11 @@ def run_fit(
     return chosen
 
 
-def best(fits: Collection[Fit]) -> Fit:
-    """Least error among fits that are stable and likely in equibiaxial tension; among all if there is
-    none."""
+def best(fits: list[Fit]) -> Fit:
+    """Least error among fits that are stable and likely in equibiaxial tension, among all if there is none;
+    the first of those that a test cannot tell apart."""
     stable = [f for f in fits if not any(w.startswith(("unstable", "unlikely")) for w in f.warnings)]
-    return min(stable or fits, key=lambda f: f.error)
+    return min(stable or fits, key=lambda f: max(f.error, RESOLVED))
 
 
 def parameters(material: Hyperelastic) -> str:
@@ -130,7 +141,7 @@ def draw(
         fitted.plot(s.stretch[near], s.stress[near], ".", color="0.6", markersize=3)
     fitted.plot([], [], ".", color="0.6", label="test")
 
-    def style(f: Fit) -> dict:
+    def style(f):
         i = list(LAWS).index(f.material.law)
         # dashed in turn: a law may hide another that it contains
         return {

@@ -196,7 +196,8 @@ def _warnings(material, tests):
 
 
 def biaxial_spread(fits: Iterable[Fit], stretch: float) -> tuple[float, float]:
-    """(lowest, highest) equibiaxial nominal stress (MPa) that the fitted laws predict at this stretch."""
+    """(lowest, highest) equibiaxial nominal stress (MPa) that the fitted laws predict at this stretch; inf
+    where all have locked."""
     values = [float(nominal_stress(f.material, "equibiaxial", stretch)) for f in fits]
-    known = [v for v in values if np.isfinite(v)]
+    known = [v for v in values if np.isfinite(v)] or [np.inf]
     return min(known), max(known)

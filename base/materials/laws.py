@@ -17,7 +17,7 @@ from pneunet.base.errors import InputError, located
 from pneunet.base.files.toml import as_table, from_table, to_table
 from pneunet.base.materials import halfpowers
 from pneunet.base.materials.hyperelastic import MODES, stable_stretch
-from pneunet.base.materials.silicones import bulletin
+from pneunet.base.materials.silicones import measured_silicone
 from pneunet.base.quantities import Checked, quantities, quantity
 
 #: a law that is not stable up to this stretch has a slip in its numbers
@@ -288,25 +288,25 @@ PAPER_HELICAL = NeoHookean(
 LAWS: dict[str, type[Hyperelastic]] = {cls.law: cls for cls in (NeoHookean, MooneyRivlin, Yeoh, Gent, Ogden)}
 
 
-def silicone(name: str) -> NeoHookean:
-    """NeoHookean of the table in base.materials.silicones; InputError for another name."""
-    return from_table(NeoHookean, bulletin(name), "silicone")
+def silicone(name: str) -> Hyperelastic:
+    """The law of the table in base.materials.silicones; InputError for another name."""
+    return material_from_table(measured_silicone(name), "silicone")
 
 
 def material_from_table(table: dict, where: str) -> Hyperelastic:
     """A law from its TOML table: `law = "..."` (default neo-Hookean) with its parameters, or `silicone =
-    "..."`, a row of the table in base.materials.silicones, of which further keys replace values."""
+    "..."`, the law of a row in base.materials.silicones, of which further keys replace values."""
     table = as_table(table, where)
     if "silicone" in table:
         if "law" in table:
-            raise InputError(
-                f"{where}: 'silicone' and 'law' exclude each other: the table of silicones is neo-Hookean"
-            )
+            raise InputError(f"{where}: 'silicone' and 'law' exclude each other: a silicone has its law")
         with located(where):
-            table = {**bulletin(table.pop("silicone")), **table}
+            table = {**measured_silicone(table.pop("silicone")), **table}
     law = table.pop("law", NeoHookean.law)
     if law not in tuple(LAWS):
         raise InputError(f"{where}: unknown law '{law}': known laws are {', '.join(LAWS)}")
+    if law == Yeoh.law and "mu_MPa" in table:
+        raise InputError(f"{where}: law 'Yeoh' has no 'mu_MPa': write 'c10_MPa', half of it")
     return from_table(LAWS[law], table, where)
 
 

@@ -136,7 +136,7 @@ def test_a_layer_takes_its_own_material_or_the_common_one(tmp_path):
         (
             "mu_MPa = 0.3",
             'silicone = "Ecoflex"',
-            r"\[material\]: silicone = 'Ecoflex' is not in the table: known are Ecoflex 00-10",
+            r"\[material\]: silicone = 'Ecoflex' is not in the table: known are BodyDouble SILK",
         ),
         ("chambers = 3", 'chambers = 3\nmaterial = "soft"', r"\[\[segment\]\] 1 material: must be a table"),
         (

@@ -106,7 +106,7 @@ def test_a_case_is_known_by_its_complete_inputs(tmp_path):
 
 def test_the_tables_of_a_cell_read_back():
     segment = CASES["one_sided_w10"](
-        angle=60.0, chambers=1, layer_thickness=0.5, layer_material=silicone("Mold Star 30")
+        angle=60.0, chambers=1, layer_thickness=0.5, layer_material=silicone("Mold Star 20T")
     )
     for case in (
         CellCase(segment, 0.0123, 2.5, 3, {4: 0.002}),
