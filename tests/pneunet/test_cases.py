@@ -127,12 +127,25 @@ def test_a_cache_serves_one_at_a_time_and_forgets_half_a_module(tmp_path, monkey
         ]
 
 
-def test_folders_of_finished_cases_keep_their_names():
+#: what the study's silicone was when its cases were first named
+FIRST_MATERIAL = """mu_MPa = 0.1931
+density_kg_per_m3 = 1080
+elongation_at_break_percent = 620
+name = "Dragon Skin 20"
+source = "technical bulletin, from memory, not compared since; mu from its 100 % modulus, 49 psi / 1.75"
+"""
+
+
+def test_folders_of_finished_cases_keep_their_names(tmp_path):
     """Wherever their functions move: weeks of computing are found again."""
     campaign = read_campaign(ROOT / "examples" / "campaigns" / "cells-v1.toml")
     assert campaign.designs[0].case.name == "2cd907a6e41e"
-    study = read_study(ROOT / "examples" / "studies" / "angles.toml")
-    assert study.cases[0].case.name == "6b6b771ce679"
+    text = (ROOT / "examples" / "studies" / "angles.toml").read_text()
+    first = text.replace("pressure_kPa = 25", "pressure_kPa = 40")
+    first = first.replace('silicone = "Dragon Skin 20"', FIRST_MATERIAL)
+    for tables, name in ((text, "0620d66839ad"), (first, "6b6b771ce679")):
+        (tmp_path / "study.toml").write_text(tables)
+        assert read_study(tmp_path / "study.toml").cases[0].case.name == name
     for place in FUNCTIONS.values():
         module, name = place.split(":")
         assert callable(getattr(importlib.import_module(module), name))
