@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 #: points that curvature and torsion are found on
 FINE = 401
@@ -63,6 +62,8 @@ class Curve:
         smooths noise and blurs jumps over the same length. Torsion is 0 where the curve is too straight to
         have one.
         """
+        from scipy.signal import savgol_filter  # takes longer to load than everything else here
+
         step = self.length / (FINE - 1)
         width = min(FINE - 2, max(7, 2 * round(window / step / 2) + 1))
         even = self.evenly(FINE)

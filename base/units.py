@@ -1,10 +1,16 @@
 """Consistent units: mm, N, MPa, tonne, s. Files and the command line carry the unit in the key; inside there
 is one system, and these are the factors between the two."""
 
+from numbers import Real
+
+from pneunet.base.errors import InputError
+
 MPA_PER_KPA, KPA_PER_MPA = 1e-3, 1e3
 TONNE_PER_MM3_PER_KG_PER_M3 = 1e-12
 PER_MM_PER_M = 1e-3  # 1/m -> 1/mm
 GRAVITY = 9810.0  # mm/s^2
+#: more than silicone bears: a larger number is in another unit
+LARGEST_PRESSURE_KPA = 2000.0
 
 #: unit suffix of a file key -> factor to the consistent system
 TO_INTERNAL = {
@@ -21,3 +27,11 @@ TO_INTERNAL = {
     "N_mm": 1.0,
     "rad_per_m": PER_MM_PER_M,
 }
+
+
+def in_MPa(pressure_kPa: float) -> float:
+    """A pressure in MPa; InputError where it is no number of kPa that silicone bears."""
+    if not (isinstance(pressure_kPa, Real) and 0 <= pressure_kPa <= LARGEST_PRESSURE_KPA):
+        shown = f"{pressure_kPa:g}" if isinstance(pressure_kPa, Real) else repr(pressure_kPa)
+        raise InputError(f"pressure_kPa = {shown} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
+    return pressure_kPa * MPA_PER_KPA

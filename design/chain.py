@@ -10,21 +10,18 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.files.atomic import output_directory, write_text
 from pneunet.base.files.results import Results, read_run
 from pneunet.base.files.toml import toml_text
-from pneunet.base.units import MPA_PER_KPA
-from pneunet.design.design import Design, checked_kPa
+from pneunet.base.units import in_MPa
+from pneunet.design.design import Design
 from pneunet.design.report.rundata import Solution, read_design_folder
 from pneunet.geometry.parameters import Segment
 from pneunet.reduced.choice import choose_law
-
-if TYPE_CHECKING:
-    pass
 
 DONE, BAD_INPUT = 0, 2
 
@@ -70,14 +67,15 @@ def solve(
     resume: bool = False,
 ) -> Solution:
     """Design.solve."""
-    folder = design.save(directory)
-    arguments = ["solve", str(folder / "design.toml")]
+    arguments = []
     if pressure_kPa is not None:
-        arguments += ["--pressure-kPa", repr(checked_kPa(pressure_kPa))]
+        in_MPa(pressure_kPa)  # before anything is written
+        arguments += ["--pressure-kPa", repr(float(pressure_kPa))]
     if mesh_size_mm is not None:
         arguments += ["--mesh-size-mm", repr(float(mesh_size_mm))]
     arguments += ["--no-fields"] * (not fields) + ["--resume"] * resume
-    run_command(arguments, ranks)
+    folder = design.save(directory)
+    run_command(["solve", str(folder / "design.toml"), *arguments], ranks)
     solution = read_design_folder(folder).solve
     assert solution is not None, "a solve that ends well leaves its tables"
     return solution
@@ -96,26 +94,20 @@ def solve_cell(
 
     levels: pressures at which the state is recorded. contact: 'auto', 'none' or 'third-medium'. The folder
     gets what `pneunet cell` writes; the table `cell` of the answer has strains, forces and stiffness over
-    pressure.
+    pressure. InputError on bad input, ConvergenceError where no level can be reached.
     """
     from pneunet.hifi.cell.file import CellCase, cell_tables
 
-    case = CellCase(segment, checked_kPa(pressure_kPa) * MPA_PER_KPA, mesh_size_mm, levels, contact=contact)
-    return _run_cell(cell_tables(case), directory)
-
-
-def _run_cell(tables: dict, directory: str | Path) -> Results:
-    from pneunet.base.files.atomic import output_directory, write_text
-
+    case = CellCase(segment, in_MPa(pressure_kPa), mesh_size_mm, levels, contact=contact)
     folder = output_directory(directory)
-    write_text(folder / "cell.toml", toml_text(tables))
+    write_text(folder / "cell.toml", toml_text(cell_tables(case)))
     run_command(["cell", str(folder / "cell.toml")])
     return read_run(folder)
 
 
 def run_study(path: str | Path, directory: str | Path, *, ranks: int = 1) -> Results:
     """Bodies over a grid or a list (docs/studies.md), as `pneunet study`; the table `study` of the answer has
-    a row a case and pressure level."""
+    a row a case and pressure level. InputError on bad input."""
     run_command(["study", str(path), "-o", str(directory)], ranks)
     return read_run(directory)
 

@@ -6,17 +6,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 import scipy
 
-from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import output_directory, write_csv
 from pneunet.base.files.record import write_record
-from pneunet.base.files.schemas import CENTRELINE, TARGET
+from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
-from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
+from pneunet.base.units import KPA_PER_MPA, in_MPa
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
@@ -31,7 +30,8 @@ if TYPE_CHECKING:
 
     from pneunet.design.report.rundata import Solution
 
-LARGEST_PRESSURE_KPA = 2000.0
+#: of run.json: what belongs to the search
+EFFORT = ("inputs", "evaluations", "wall_seconds")
 log = logging.getLogger(__name__)
 
 
@@ -60,30 +60,40 @@ class Design:
         law: str | SegmentLaw = "trained",
         mesh_size_mm: float = 2.0,
     ) -> "Design":
-        """A Manipulator made by hand at a pressure. law: 'trained', 'analytic' or a law's file (.npz)."""
-        pressure = checked_kPa(pressure_kPa)
-        content = DesignFile(manipulator, pressure * MPA_PER_KPA, name=name, mesh_size=mesh_size_mm)
+        """A Manipulator made by hand at a pressure. law: 'trained', 'analytic', a law's file (.npz) or a
+        SegmentLaw. InputError where pressure or mesh size is none."""
+        content = DesignFile(manipulator, in_MPa(pressure_kPa), name=name, mesh_size=mesh_size_mm)
         return cls(content, chosen_law(law))
 
     @classmethod
     def read(cls, path: str | Path, law: str | SegmentLaw | None = None) -> "Design":
-        """The design in a design.toml, or in the folder that holds one; law: by default the one it was
-        designed with. InputError where there is none."""
+        """The design in a design.toml, or in the folder that holds one, with what that tells of its search.
+
+        law: by default the one it was designed with. InputError where there is none.
+        """
         from pneunet.design.report.rundata import read_design_folder
 
         path = Path(path)
         if path.name != "design.toml" and not path.is_dir():
             return cls(read_design_file(path), chosen_law("trained" if law is None else law))
         folder = read_design_folder(path if path.is_dir() else path.parent)
-        target = None if folder.target is None else Target(folder.target, folder.design.name)
-        return cls(folder.design, chosen_law(folder.law if law is None else law), target)
+        content, told = folder.design, folder.design.result
+        return cls(
+            content,
+            chosen_law(folder.law if law is None else law),
+            None if folder.target is None else Target(folder.target, content.name),
+            tuple(told.get("active_bounds", ())),
+            tuple(told.get("grown_ranges", ())),
+            {key: folder.record[key] for key in EFFORT if key in folder.record},
+        )
 
     def __repr__(self) -> str:
         m = self.manipulator
         told = f"{len(m.segments)} segments, {m.length:.1f} mm, {self.pressure_kPa:.4g} kPa"
-        if self.errors:
-            told += f"; RMS {self.errors.rms:.2f} mm ({self.errors.percent(self.errors.rms):.2f} %)"
-        return f"<Design {self.content.name}: {told}; {len(self.doubts)} doubts>"
+        known = vars(self)  # computes nothing: doubts may take seconds
+        if errors := known.get("errors"):
+            told += f"; RMS {errors.rms:.2f} mm ({errors.percent(errors.rms):.2f} %)"
+        return f"<Design {self.content.name}: {told}{f'; {len(self.doubts)} doubts' * ('doubts' in known)}>"
 
     @property
     def manipulator(self) -> Manipulator:
@@ -103,7 +113,7 @@ class Design:
     @cached_property
     def errors(self) -> Errors | None:
         """How far the prediction is from the target; None without one."""
-        return self.target and compare(self.prediction.points, self.target.curve)
+        return None if self.target is None else compare(self.prediction.points, self.target.curve)
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
@@ -115,31 +125,44 @@ class Design:
         """RodStrains (segments, 3) of the segments' active parts at the design's pressure."""
         return self.law.each(self.manipulator.segments, self.content.pressure)
 
+    @overload
+    def predict(self, pressures_kPa: float) -> Centreline: ...
+
+    @overload
+    def predict(self, pressures_kPa: Iterable[float]) -> list[Centreline]: ...
+
     def predict(self, pressures_kPa: float | Iterable[float]) -> Centreline | list[Centreline]:
-        """The Centreline at a pressure, or a list of them at several; ConvergenceError where the law has no
-        equilibrium."""
-        if np.ndim(pressures_kPa) == 0:
-            return self._predicted(checked_kPa(pressures_kPa) * MPA_PER_KPA)
-        return [self._predicted(checked_kPa(p) * MPA_PER_KPA) for p in pressures_kPa]
+        """The Centreline at a pressure, or a list of them at several, in the target's coordinates.
+
+        InputError for a pressure that is none, ConvergenceError where the law has no equilibrium.
+        """
+        if isinstance(pressures_kPa, Iterable):
+            return [self.predict(p) for p in pressures_kPa]
+        return self._predicted(in_MPa(pressures_kPa))
 
     def _predicted(self, pressure):
         return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)
 
     def save(self, directory: str | Path) -> Path:
         """Write design.toml, centreline.csv, run.json, with a target target.csv and with matplotlib
-        design.png; the folder."""
+        design.png; the folder. InputError where it cannot be written to."""
+        from pneunet.base.pictures import rendering
+
         directory = output_directory(directory)
         content, line = self.content, self.prediction
         if self.target is not None:
-            write_csv(directory / "target.csv", TARGET, self.target.points)
+            write_csv(directory / "target.csv", POINT, self.target.points)
             content = replace(content, target="target.csv")
         write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
         write_design_file(directory / "design.toml", content)
         versions = {"numpy": np.__version__, "scipy": scipy.__version__}
-        inputs = {"law": self.law.name} | self.effort.get("inputs", {})
+        inputs = self.effort.get("inputs", {}) | {"law": self.law.name}
         record = {"inputs": inputs, "versions": versions, "doubts": list(self.doubts)}
-        write_record(directory, **{**self.effort, **record})
-        self.draw(directory / "design.png")
+        write_record(directory, **(self.effort | record))
+        try:
+            rendering.save(self.plot(), directory / "design.png")
+        except ImportError:
+            log.info("no picture: matplotlib is missing, install it with: pip install 'pneunet[pictures]'")
         return directory
 
     def plot(self) -> "Figure":
@@ -147,17 +170,6 @@ class Design:
         from pneunet.design.report.pictures import design_figure
 
         return design_figure(self.content, self.prediction, self.target, self.errors)
-
-    def draw(self, path: str | Path) -> bool:
-        """Write the figure as a PNG; False, with a line in the log, without matplotlib."""
-        from pneunet.base.pictures.rendering import save
-
-        try:
-            save(self.plot(), path)
-        except ImportError:
-            log.info("no picture: matplotlib is missing, install it with: pip install 'pneunet[pictures]'")
-            return False
-        return True
 
     def solve(
         self,
@@ -182,12 +194,5 @@ class Design:
 
 
 def chosen_law(law: str | SegmentLaw) -> SegmentLaw:
-    """A law by its name or file, or as it is."""
+    """A law by its name or file, or as it is; InputError where there is none of that name."""
     return choose_law(law) if isinstance(law, str) else law
-
-
-def checked_kPa(pressure: float) -> float:
-    """A pressure in kPa; InputError where it is none that silicone bears."""
-    if not 0 <= float(pressure) <= LARGEST_PRESSURE_KPA:
-        raise InputError(f"pressure_kPa = {pressure:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
-    return float(pressure)

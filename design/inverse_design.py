@@ -9,17 +9,17 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import require_writable
+from pneunet.base.files.schemas import STRAINS
 from pneunet.base.strains import RodStrains
-from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.design import Design, chosen_law
-from pneunet.design.search.doubts import WARN, tell_doubts
+from pneunet.design.search.doubts import WARN, WAYS, tell_doubts
 from pneunet.design.search.inverse import search
 from pneunet.design.search.problem import OBJECTIVES, PAIRED
-from pneunet.design.target.extraction import Extracted, extract
+from pneunet.design.target.extraction import Extracted, extract, rates
 from pneunet.design.target.segmentation import NOTE, split
-from pneunet.design.target.target import HELICAL, TWISTING, Target
+from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile
-from pneunet.geometry.parameters import TWISTING as TWISTING_KIND
+from pneunet.geometry.parameters import TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
 
 GIVEN_NOTE = "split given by the user"
@@ -48,8 +48,9 @@ def inverse_design(
     the law doubts. InputError on bad input, ConvergenceError where the law has no answer.
     """
     started = time.perf_counter()
-    if objective not in OBJECTIVES:
-        raise InputError(f"objective = '{objective}' is not known: write {' or '.join(OBJECTIVES)}")
+    for name, value, known in (("objective", objective, OBJECTIVES), ("outside", outside, WAYS)):
+        if value not in known:
+            raise InputError(f"{name} = '{value}' is not known: write {' or '.join(known)}")
     law, target = chosen_law(law), as_target(target)
     pieces, note = (target.pieces, GIVEN_NOTE) if target.pieces else (split(target.curve), NOTE)
     log.info(f"target {target.name}: {len(target.points)} points, {target.length:.2f} mm; {note}")
@@ -73,7 +74,7 @@ def inverse_design(
             "doubts": list(design.doubts),
             "active_bounds": list(found.active),
             "grown_ranges": list(found.grown),
-            "target_error": design.errors.table(),
+            "target_error": design.errors.table() if design.errors else {},
             "piece": [
                 {**piece.table(), "predicted": predicted(piece.kind, RodStrains(e, k))}
                 for piece, e, k in zip(wanted, design.strains.e, design.strains.k)
@@ -84,7 +85,7 @@ def inverse_design(
 
 
 def as_target(target: Target | str | Path | np.ndarray) -> Target:
-    """A Target from itself, from its file or from points (n, 3) in mm."""
+    """A Target from itself, from its file or from points (n, 3) in mm; InputError for one that cannot be."""
     if isinstance(target, Target):
         return target
     return Target.read(target) if isinstance(target, str | Path) else Target(np.asarray(target, float))
@@ -96,11 +97,11 @@ def run_design(
     """`pneunet design`: the inverse design of a target's file, saved in a folder, with its table on the
     screen.
 
-    Nothing is written before the design is found.
+    Nothing is written before the design is found. InputError and ConvergenceError as for inverse_design.
     """
-    target = Target.read(target)
+    wanted = Target.read(target)
     require_writable(directory)
-    design = inverse_design(target, law=law, objective=objective, outside=outside)
+    design = inverse_design(wanted, law=law, objective=objective, outside=outside)
     design.save(directory)
     for text in summary(design):
         log.info(text)
@@ -110,49 +111,34 @@ def run_design(
 def describe(piece: Extracted) -> str:
     """One line about an `Extracted` piece, in the field's units."""
     table = piece.table()
-    rates = ", ".join(
-        f"{name} {table[key]:.4g} {unit}" for key, (name, unit) in RATES.items() if key in table
-    )
+    told = [f"{name} {table[key]:.4g} {unit}" for key, (name, unit) in RATES.items() if key in table]
     note = f" ({piece.note})" if piece.note else ""
-    return f"{piece.kind:8s} {piece.length:6.1f} mm, {rates}{note}"
+    return f"{piece.kind:8s} {piece.length:6.1f} mm, {', '.join(told)}{note}"
 
 
 def predicted(kind: str, strains: RodStrains) -> dict[str, float]:
     """What the law predicts for the active part of a piece's segment, by file key; rates per deformed
     length."""
-    table = {
-        "stretch": strains.stretch,
-        "k1_rad_per_mm": strains.k[0],
-        "k2_per_mm": strains.k[1],
-        "k3_per_mm": strains.k[2],
-    }
-    if kind == TWISTING:
-        table["tau_rad_per_mm"] = strains.twist_per_deformed_length
-    else:
-        table["curvature_per_m"] = 1e3 * strains.frenet_curvature
-    if kind == HELICAL:
-        table["torsion_rad_per_m"] = 1e3 * strains.frenet_torsion
-        table["cylinder_curvature_per_m"] = 1e3 * strains.helix_cylinder_curvature
-        table["pitch_mm"] = strains.helix_pitch
-    return {key: float(value) for key, value in table.items()}
+    table = {"stretch": strains.stretch} | dict(zip(STRAINS[3:], strains.k))
+    return {key: float(value) for key, value in table.items()} | rates(kind, strains)
 
 
 def summary(design: Design) -> Iterator[str]:
     """Lines of the table that `pneunet design` ends with."""
     yield "  segment    angle  chambers  height    base     gap  length   wanted   reached (active part)"
-    content, m = design.content, design.manipulator
-    for i, (segment, piece) in enumerate(zip(m.segments, content.result["piece"]), start=1):
-        base = f"{segment.base_thickness:6.2f}" if segment.kind != TWISTING_KIND else "     -"
+    m = design.manipulator
+    for i, (segment, piece) in enumerate(zip(m.segments, design.content.result["piece"]), start=1):
+        base = f"{segment.base_thickness:6.2f}" if segment.kind != TWISTING else "     -"
         yield (
             f"  {i} {segment.kind:9s}{segment.angle:6.1f}  {segment.chambers:8d} "
             f" {segment.chamber_height:6.2f}  {base}  {segment.gap:6.2f}  {segment.length:6.1f}  "
             f" {_rates(piece)}   {_rates(piece['predicted'])}"
         )
     length, seconds = f"undeformed length {m.length:.1f} mm", design.effort["wall_seconds"]
-    yield f"pressure {KPA_PER_MPA * content.pressure:.2f} kPa, {length}, {seconds:.0f} s"
-    yield "errors of the reduced prediction:"
-    for text in design.errors.lines():
-        yield "  " + text
+    yield f"pressure {design.pressure_kPa:.2f} kPa, {length}, {seconds:.0f} s"
+    if design.errors:
+        yield "errors of the reduced prediction:"
+        yield from ("  " + text for text in design.errors.lines())
     if design.widened_ranges:
         yield "ranges that were widened: " + "; ".join(design.widened_ranges)
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")

@@ -11,14 +11,15 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import atomic_path, output_directory, write_csv
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import SHAPES
-from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
-from pneunet.design.design import checked_kPa
+from pneunet.base.units import in_MPa
+from pneunet.design.design import Design
 from pneunet.design.report.labels import plain
 from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import read_design_file
 from pneunet.reduced.choice import choose_law
+from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.prediction import doubts, predict
+from pneunet.reduced.rod.prediction import doubts
 
 log = logging.getLogger(__name__)
 STEPS = 5
@@ -38,23 +39,23 @@ def run_shape(
 
     law: by default the trained one that comes along. outside: 'warn' or 'refuse' where the law doubts the
     design at one of the pressures. centrelines.csv (pressure_kPa, s_mm, x_mm, y_mm, z_mm in target
-    coordinates), body_<pressure>kPa.vtp, bodies.png, inflation.gif, run.json. Pressures beyond the law's
-    limit: the others are written, then ConvergenceError names what is there. Returns the folder.
+    coordinates), body_<pressure>kPa.vtp, bodies.png, inflation.gif, run.json. InputError on bad input and for
+    doubts that are refused. Pressures beyond the law's limit: the others are written, then ConvergenceError
+    names what is there. Returns the folder.
     """
-    design = read_design_file(design_path)
+    design = Design(read_design_file(design_path), choose_law() if law is None else law)
     if pressures_kPa is None:
-        pressures_kPa = [design.pressure * KPA_PER_MPA * i / STEPS for i in range(1, STEPS + 1)]
+        pressures_kPa = [design.pressure_kPa * i / STEPS for i in range(1, STEPS + 1)]
     if not len(pressures_kPa):
         raise InputError("--pressure-kPa: give at least one pressure")
-    pressures = [checked_kPa(p) * MPA_PER_KPA for p in pressures_kPa]
-    law = choose_law() if law is None else law
-    doubted = doubts(design.manipulator, pressures, law)
-    tell_doubts(doubted, law, outside)
+    doubted = doubts(design.manipulator, [in_MPa(p) for p in pressures_kPa], design.law)
+    tell_doubts(doubted, design.law, outside)
     folder = output_directory(Path(directory) / "shape")
-    shapes, failed = {}, {}
-    for p in sorted(set(pressures)):
+    shapes: dict[float, Centreline] = {}
+    failed: dict[float, str] = {}
+    for p in sorted(set(pressures_kPa)):
         try:
-            shapes[p] = predict(design.manipulator, p, law, base_pose=design.base_pose)
+            shapes[p] = design.predict(p)
         except ConvergenceError as error:
             failed[p] = str(error)
     if not shapes:
@@ -62,23 +63,23 @@ def run_shape(
     write_csv(
         folder / "centrelines.csv",
         SHAPES,
-        [[p * KPA_PER_MPA, s, *point] for p, line in shapes.items() for s, point in zip(line.s, line.points)],
+        [[p, s, *point] for p, line in shapes.items() for s, point in zip(line.s, line.points)],
     )
     log.info(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
     for p, line in shapes.items():
         tip = ", ".join(f"{x:.1f}" for x in line.points[-1])
-        log.info(f"  {plain(p * KPA_PER_MPA):>6} kPa: length {line.length:.1f} mm, tip at ({tip}) mm")
+        log.info(f"  {plain(p):>6} kPa: length {line.length:.1f} mm, tip at ({tip}) mm")
     try:
-        _pictures(design, shapes, law, folder)
+        _pictures(design, list(shapes), folder)
     except ImportError as error:
         log.info(f"no pictures: {error}; install them with: pip install 'pneunet[pictures]'")
     write_record(
         folder,
         design=str(design_path),
-        law=law.name,
+        law=design.law.name,
         doubts=list(doubted),
-        pressures_kPa=[p * KPA_PER_MPA for p in shapes],
-        failed_kPa={plain(p * KPA_PER_MPA): why for p, why in failed.items()},
+        pressures_kPa=list(shapes),
+        failed_kPa={plain(p): why for p, why in failed.items()},
     )
     if failed:
         first = min(failed)
@@ -89,28 +90,33 @@ def run_shape(
 
 
 def _list(pressures):
-    return ", ".join(plain(p * KPA_PER_MPA) for p in pressures)
+    return ", ".join(plain(p) for p in pressures)
 
 
-def _pictures(design, shapes, law, folder):
+def _pictures(design, pressures, folder):
+    bodies, view = _bodies(design, pressures)
+    for p, body in zip(pressures, bodies):
+        with atomic_path(folder / f"body_{plain(p)}kPa.vtp") as temporary:
+            body.save(temporary)
+    _picture_of_all(design, view, pressures, bodies, folder / "bodies.png")
+    log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
+    highest = max(pressures)
+    if highest > 0:
+        _animation(design, highest, folder / "inflation.gif")
+        log.info(f"inflation from 0 to {plain(highest)} kPa: {folder / 'inflation.gif'}")
+
+
+def _bodies(design, pressures):
+    """(a mesh a pressure in kPa, the View that holds them all)."""
     from pneunet.base.pictures.rendering import view_of
     from pneunet.design.report.bodies import body_mesh
 
-    bodies = {p: body_mesh(design.manipulator, p, law, design.base_pose) for p in shapes}
-    for p, body in bodies.items():
-        with atomic_path(folder / f"body_{plain(p * KPA_PER_MPA)}kPa.vtp") as temporary:
-            body.save(temporary)
-    _picture_of_all(
-        design, view_of(np.vstack([body.points for body in bodies.values()])), bodies, folder / "bodies.png"
-    )
-    log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
-    highest = max(shapes)
-    if highest > 0:
-        _animation(design, highest, law, folder / "inflation.gif")
-        log.info(f"inflation from 0 to {plain(highest * KPA_PER_MPA)} kPa: {folder / 'inflation.gif'}")
+    pose = design.content.base_pose
+    bodies = [body_mesh(design.manipulator, in_MPa(p), design.law, pose) for p in pressures]
+    return bodies, view_of(np.vstack([body.points for body in bodies]))
 
 
-def _picture_of_all(design, view, bodies, path):
+def _picture_of_all(design, view, pressures, bodies, path):
     """One panel a pressure, same camera and scale."""
     from pneunet.base.pictures.rendering import figure, render, save, show
     from pneunet.design.report.bodies import painted
@@ -119,7 +125,7 @@ def _picture_of_all(design, view, bodies, path):
     rows = -(-len(bodies) // columns)
     width, height = 5.0 * columns, 4.3 * rows + 0.5
     fig = figure(width, height)
-    for number, (p, body) in enumerate(bodies.items()):
+    for number, (p, body) in enumerate(zip(pressures, bodies)):
         column, row = number % columns, number // columns
         top = height - 0.5 - 4.3 * row
         show(
@@ -130,31 +136,28 @@ def _picture_of_all(design, view, bodies, path):
         fig.text(
             (5.0 * column + 0.2) / width,
             (top - 0.1) / height,
-            f"{plain(p * KPA_PER_MPA)} kPa",
+            f"{plain(p)} kPa",
             fontsize=13,
             weight="bold",
             va="top",
         )
-    fig.text(
-        0.2 / width, 1 - 0.12 / height, f"{design.name}: reduced model", fontsize=16, weight="bold", va="top"
-    )
+    title = f"{design.content.name}: reduced model"
+    fig.text(0.2 / width, 1 - 0.12 / height, title, fontsize=16, weight="bold", va="top")
     save(fig, path, dpi=90)
 
 
-def _animation(design, highest, law, path):
-    """A GIF that inflates to `highest` (MPa) and holds; 24 frames of a few kB each."""
+def _animation(design, highest, path):
+    """A GIF that inflates to `highest` (kPa) and holds; 24 frames of a few kB each."""
     from PIL import Image, ImageDraw
 
-    from pneunet.base.pictures.rendering import render, view_of
-    from pneunet.design.report.bodies import body_mesh, painted
+    from pneunet.base.pictures.rendering import render
+    from pneunet.design.report.bodies import painted
 
-    pressures = highest * np.linspace(0, 1, FRAMES)
-    bodies = [body_mesh(design.manipulator, p, law, design.base_pose) for p in pressures]
-    view = view_of(np.vstack([body.points for body in bodies]))
-    frames = []
+    pressures, frames = highest * np.linspace(0, 1, FRAMES), []
+    bodies, view = _bodies(design, pressures)
     for p, body in zip(pressures, bodies):
         frame = Image.fromarray(render(view, painted(body), FRAME_PIXELS))
-        ImageDraw.Draw(frame).text((12, 10), f"{p * KPA_PER_MPA:.0f} kPa", fill=(0, 0, 0))
+        ImageDraw.Draw(frame).text((12, 10), f"{p:.0f} kPa", fill=(0, 0, 0))
         frames.append(frame.quantize(64))
     durations = [90] * (FRAMES - 1) + [1200]
     with atomic_path(path) as temporary:

@@ -10,6 +10,7 @@ from pneunet.base.files.atomic import write_text
 from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown, to_table, toml_text
 from pneunet.base.materials.laws import Hyperelastic, material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
+from pneunet.base.units import LARGEST_PRESSURE_KPA
 from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_control
 from pneunet.geometry.parameters import Manipulator, Segment
 
@@ -28,7 +29,7 @@ class DesignFile(Checked):
     """
 
     manipulator: Manipulator
-    pressure: float = quantity("kPa", low=0, high=2000)
+    pressure: float = quantity("kPa", low=0, high=LARGEST_PRESSURE_KPA)
     name: str = quantity(None, "design")
     base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
     mesh_size: float = quantity("mm", 2.0, low=0.1, high=20)

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from pneunet.base.errors import InputError
-
-LARGEST_PRESSURE_KPA = 2000.0
+from pneunet.base.units import LARGEST_PRESSURE_KPA
 
 
 class Parser(argparse.ArgumentParser):
@@ -34,7 +33,7 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def pressures(text: str) -> list[float]:
+def pressures(text: str, least: float = math.ulp(0.0)) -> list[float]:
     """kPa of a comma-separated list."""
     values = []
     for word in text.split(","):
@@ -44,7 +43,7 @@ def pressures(text: str) -> list[float]:
             raise argparse.ArgumentTypeError(
                 f"'{word}' is not a number; write for instance 10,20,30"
             ) from None
-        if not 0 < value <= LARGEST_PRESSURE_KPA:
+        if not least <= value <= LARGEST_PRESSURE_KPA:
             raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
         values.append(value)
     return values
@@ -52,9 +51,7 @@ def pressures(text: str) -> list[float]:
 
 def one_pressure(text: str) -> float:
     """kPa; 0 is for loads alone."""
-    if text.strip() == "0":
-        return 0.0
-    values = pressures(text)
+    values = pressures(text, 0.0)
     if len(values) != 1:
         raise argparse.ArgumentTypeError("one number is wanted here")
     return values[0]

@@ -1,14 +1,15 @@
 """Functions of the front door that name units where the rooms behind it have one consistent system (mm,
 MPa)."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.files.toml import from_table
 from pneunet.base.materials.laws import Hyperelastic, material_from_table
-from pneunet.base.units import MPA_PER_KPA
-from pneunet.design.design import Design, checked_kPa, chosen_law
+from pneunet.base.units import in_MPa
+from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.report import write_report
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.loading import DeadLoads
@@ -19,28 +20,32 @@ from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.rod import Rod
 
 
-def segment(material: Hyperelastic | None = None, **keys: object) -> Segment:
+def segment(
+    material: Hyperelastic | None = None, layer_material: Hyperelastic | None = None, **keys: object
+) -> Segment:
     """A Segment from a design.toml's keys: segment(kind="one-sided", angle_deg=60, chambers=8, width_mm=12).
 
-    material: by default the paper's. InputError that names key and fix otherwise.
+    material: by default the paper's; layer_material: of a bottom layer. InputError that names key and fix
+    where a key is unknown, missing or wrong.
     """
-    return segment_from_table(keys, "segment", material or Segment.material)
+    return segment_from_table(keys, "segment", material or Segment.material, layer_material)
 
 
 def material(**keys: object) -> Hyperelastic:
     """A material from a design.toml's keys: material(law="Yeoh", c10_MPa=0.1, c20_MPa=0.01) or
-    material(silicone="Ecoflex 00-30")."""
+    material(silicone="Ecoflex 00-30"). InputError that names key and fix otherwise."""
     return material_from_table(keys, "material")
 
 
 def loads(**keys: object) -> DeadLoads:
     """Dead loads from a design.toml's keys: loads(gravity_m_per_s2=[0, 0, -9.81], tip_force_N=[0, 0,
-    -0.1])."""
+    -0.1]). InputError that names key and fix otherwise."""
     return from_table(DeadLoads, keys, "loads")
 
 
-def read_design(path: str | Path, law: str | None = None) -> Design:
-    """The Design in a design.toml or in its folder; law: by default the one that it was designed with."""
+def read_design(path: str | Path, law: str | SegmentLaw | None = None) -> Design:
+    """The Design in a design.toml or in its folder; law: by default the one that it was designed with.
+    InputError where there is none."""
     return Design.read(path, law)
 
 
@@ -53,29 +58,30 @@ def predict(
 ) -> Centreline:
     """The Centreline (mm) of a free Manipulator at a pressure; base_pose (4, 4): frame of its base.
 
-    law: 'trained', 'analytic', a law's file (.npz) or a SegmentLaw.
+    law: 'trained', 'analytic', a law's file (.npz) or a SegmentLaw. InputError for a pressure that is none,
+    ConvergenceError where the law has no equilibrium.
     """
-    pressure = checked_kPa(pressure_kPa) * MPA_PER_KPA
-    return prediction.predict(manipulator, pressure, chosen_law(law), base_pose=base_pose)
+    return prediction.predict(manipulator, in_MPa(pressure_kPa), chosen_law(law), base_pose=base_pose)
 
 
 def rod(
     manipulator: Manipulator,
     *,
-    pressure_kPa: float | list[float],
+    pressure_kPa: float | Iterable[float],
     law: str | SegmentLaw = "trained",
     base_pose: np.ndarray | None = None,
 ) -> Rod:
     """The Rod of a Manipulator, which carries loads: rod(...).equilibrium(pn.loads(tip_force_N=[0, 0,
     -0.1])).
 
-    pressure_kPa: one for all segments, or one for each.
+    pressure_kPa: one for all segments, or one for each. InputError where a pressure or their number is wrong.
     """
-    many = np.ndim(pressure_kPa) > 0
-    pressure = [checked_kPa(p) * MPA_PER_KPA for p in np.atleast_1d(pressure_kPa)]
-    return Rod.of(manipulator, chosen_law(law), pressure if many else pressure[0], base_pose)
+    if isinstance(pressure_kPa, Iterable):
+        return Rod.of(manipulator, chosen_law(law), [in_MPa(p) for p in pressure_kPa], base_pose)
+    return Rod.of(manipulator, chosen_law(law), in_MPa(pressure_kPa), base_pose)
 
 
-def report(directory: str | Path, law: str | None = None) -> Path:
-    """Write one HTML page of what a design's folder holds; its path. law: by default that of the design."""
-    return write_report(directory, chosen_law(law) if law else None)
+def report(directory: str | Path, law: str | SegmentLaw | None = None) -> Path:
+    """Write one HTML page of what a design's folder holds; its path. law: by default that of the design.
+    InputError where the folder holds no design."""
+    return write_report(directory, None if law is None else chosen_law(law))

@@ -1,6 +1,5 @@
 """What a run left in its folder, read back whatever kind of run it was."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.files.record import read_record
 from pneunet.base.files.schemas import read_table
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PARTS = ("shape", "solve", "cell")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False)
 class Results:
     """record: what run.json says. tables: {name: structured array (rows,)}, units in the names of the fields;
     a table of a folder below has the folder's name too: 'solve/steps'."""
@@ -31,11 +31,15 @@ class Results:
         return f"<Results of {self.directory}: {shown or 'no tables'}>"
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """The table called so; the folder's name may be left out where only one fits."""
-        found = [key for key in self.tables if key == name or key.endswith(f"/{name}")]
+        """The table called so; the folder's name may be left out where only one fits.
+
+        InputError where none or several fit.
+        """
+        found = [name] if name in self.tables else [key for key in self.tables if key.endswith(f"/{name}")]
         if len(found) != 1:
-            known = ", ".join(self.tables) or "none"
-            raise InputError(f"{self.directory}: table '{name}' is not there: tables are {known}")
+            told = f"stands there {len(found)} times" if found else "is not there"
+            known = ", ".join(found or self.tables) or "none"
+            raise InputError(f"{self.directory}: table '{name}' {told}: tables are {known}")
         return self.tables[found[0]]
 
     def frame(self, name: str) -> "DataFrame":
@@ -51,24 +55,17 @@ class Results:
 def read_run(directory: str | Path) -> Results:
     """The tables and run.json of a run's folder: of a design, shape, solve, cell, study or campaign.
 
-    InputError where there is neither.
+    InputError where there is neither, or one cannot be read.
     """
     directory, tables = Path(directory), {}
-    record: dict = {}
+    record = read_record(directory / "run.json")
     for name in ("", *PARTS):
         folder = directory / name
         for path in sorted(folder.glob("*.csv")):
             tables[f"{name}/{path.stem}" if name else path.stem] = read_table(path)
-        if (folder / "run.json").is_file():
-            told = _json(folder / "run.json")
-            record |= {name: told} if name else told
+        told = read_record(folder / "run.json")
+        if name and told:
+            record[name] = told
     if not tables and not record:
         raise InputError(f"{directory}: holds no tables (.csv) and no run.json: give the folder of a run")
     return Results(directory, record, tables)
-
-
-def _json(path):
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path}: cannot be read as JSON ({error})") from None

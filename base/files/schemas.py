@@ -16,8 +16,7 @@ STRAINS = ("e1", "e2", "e3", "k1_rad_per_mm", "k2_per_mm", "k3_per_mm")
 #: numbers of the strains that no choice of the section's frame changes
 INVARIANTS = ("k_norm_per_mm", "k_dot_e_per_mm")
 
-#: target.csv and centreline.csv of a design, centrelines.csv of its shapes
-TARGET = POINT
+#: centreline.csv of a design, centrelines.csv of its shapes; target.csv has POINT
 CENTRELINE = ("s_mm", *POINT)
 SHAPES = ("pressure_kPa", *CENTRELINE)
 

@@ -121,4 +121,4 @@ def rank_map() -> Iterator[Callable | None]:
         return
     executor: Any
     with MPICommExecutor(MPI.COMM_WORLD, root=0) as executor:
-        yield executor and executor.map
+        yield executor.map if executor else None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
 
 
-def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple:
+def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple["PolyData", dict]:
     """A curve (n, 3) as something to render."""
     import pyvista
 
@@ -38,7 +38,7 @@ def body_mesh(
     return mesh
 
 
-def painted(mesh: "PolyData") -> list:
+def painted(mesh: "PolyData") -> list[tuple["PolyData", dict]]:
     """A body in the colours of its segments, with its sharp edges, as things to render."""
     from matplotlib.colors import to_rgb
 
@@ -58,7 +58,7 @@ def read_solution(path: str | Path) -> "UnstructuredGrid":
     return reader.read()[0]
 
 
-def facing_walls(surface: "PolyData") -> "PolyData":
+def facing_walls(surface: "PolyData") -> "PolyData | None":
     """The part of a solution's surface where walls face each other across a gap (point data FIELD); None
     without any."""
     if FIELD not in surface.point_data:
@@ -68,7 +68,9 @@ def facing_walls(surface: "PolyData") -> "PolyData":
     return walls if walls.n_cells else None
 
 
-def deformed_surface(grid: "UnstructuredGrid", base_pose: np.ndarray | None) -> "PolyData":
+def deformed_surface(
+    grid: "UnstructuredGrid", base_pose: np.ndarray
+) -> tuple["PolyData", tuple["PolyData", dict]]:
     """(surface, sharp edges) of a solution, moved by its displacement and into target coordinates; point data
     "displacement length" (mm) beside the solver's own."""
     surface = grid.extract_surface(nonlinear_subdivision=1)

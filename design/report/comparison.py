@@ -8,7 +8,8 @@ from scipy.interpolate import CubicSpline
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError
 from pneunet.base.strains import RodStrains
-from pneunet.design.report.labels import plain
+from pneunet.base.units import KPA_PER_MPA
+from pneunet.design.report.labels import kPa, plain
 from pneunet.design.report.rundata import DesignFolder
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.reduced import doubts, predict
@@ -34,13 +35,13 @@ class Comparison:
     reduced_target: Errors | None
     solved_target: Errors | None
     reduced_solved: Errors | None
-    notes: tuple
-    nearest: tuple | None = None
+    notes: tuple[str, ...]
+    nearest: tuple[float, Errors] | None = None
 
     @classmethod
     def of(cls, run: DesignFolder, law: SegmentLaw) -> "Comparison":
+        """What a folder holds against what a law predicts."""
         design = run.design
-        doubted = doubts(design.manipulator, design.pressure, law)
         doubted = doubts(design.manipulator, design.pressure, law)
         notes = [f"The law '{law.name}' of the reduced model is in doubt: {text}." for text in doubted]
         solved = at_solve = strains = None
@@ -65,16 +66,15 @@ class Comparison:
                 nearest = _nearest(run)
             solved = se3.transform(design.base_pose, smooth(run.solve.s, run.solve.points))
             if stopped_short(run):
-                last = f"{plain(run.solve.pressure * 1e3)} kPa"
+                last = kPa(run.solve.pressure)
                 notes.append(
                     f"The finite element solution stops at {last}, below the design pressure of "
-                    f"{plain(design.pressure * 1e3)} kPa. It is compared with the reduced model at {last}; "
+                    f"{kPa(design.pressure)}. It is compared with the reduced model at {last}; "
                     "its distance to the target is that of a body not fully inflated."
                 )
             at_solve = _predict(design, run.solve.pressure, law, notes)
             if at_solve is not None:
-                each = [law.strains(s, run.solve.pressure) for s in design.manipulator.segments]
-                strains = RodStrains([s.e for s in each], [s.k for s in each])
+                strains = law.each(design.manipulator.segments, run.solve.pressure)
         return cls(
             reduced,
             at_solve,
@@ -132,7 +132,7 @@ def _predict(design, pressure, law, notes):
     try:
         return predict(design.manipulator, pressure, law, base_pose=design.base_pose).points
     except ConvergenceError as error:
-        notes.append(f"The reduced model has no solution at {plain(pressure * 1e3)} kPa: {error}")
+        notes.append(f"The reduced model has no solution at {kPa(pressure)}: {error}")
         return None
 
 
@@ -143,9 +143,10 @@ def _errors(curve, reference):
 def overlaps(run: DesignFolder) -> list[str]:
     """Sentences on what overlaps in the finite element solution: walls, parts of the body; [] when nothing
     does."""
-    solve, told = run.solve, []
+    solve = run.solve
     if solve is None:
-        return told
+        return []
+    told = []
     if solve.walls_overlap:
         depth = max([0.0] + [-distance for *_, distance in solve.walls])
         now = f", by up to {depth:.2f} mm at the end" if depth > 0 else ""
@@ -167,29 +168,23 @@ def _from(record, name):
     pressure, dead = record.get(f"{name}_kPa"), record.get(f"{name}_dead_load_fraction")
     if pressure is None:
         return "at some load"
-    return (
-        f"from {pressure:.2f} kPa on"
-        if pressure > 0 or not dead
-        else f"from {100 * dead:.3g} % of the dead loads on"
-    )
+    if dead and not pressure > 0:
+        return f"from {100 * dead:.3g} % of the dead loads on"
+    return f"from {pressure:.2f} kPa on"
 
 
 def verdict(run: DesignFolder, comparison: "Comparison") -> str:
     """The result in one honest sentence, and what forbids to trust it: a solution in which walls overlap
     confirms nothing."""
-    c, design = comparison, run.design
+    c, wanted, solve = comparison, kPa(run.design.pressure), run.solve
     promise = ""
     if c.reduced_target:
-        at = f"{plain(design.pressure * 1e3)} kPa"
-        promise = f"for {at} the reduced model promises the target within {_mm(c.reduced_target)}"
-    if c.solved is None:
-        told = promise or "there is neither a target nor a finite element solution to judge the prediction by"
-        return (
-            f"{told[0].upper()}{told[1:]}; no finite element solution confirms it yet."
-            if promise
-            else f"{told[0].upper()}{told[1:]}."
-        )
-    pressure = f"{plain(run.solve.pressure * 1e3)} kPa"
+        promise = f"for {wanted} the reduced model promises the target within {_mm(c.reduced_target)}"
+    if solve is None:
+        if promise:
+            return f"F{promise[1:]}; no finite element solution confirms it yet."
+        return "There is neither a target nor a finite element solution to judge the prediction by."
+    pressure = kPa(solve.pressure)
     if c.reduced_solved is None:
         sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"
     else:
@@ -209,23 +204,15 @@ def verdict(run: DesignFolder, comparison: "Comparison") -> str:
     elif c.solved_target:
         sentence += f"; the finite element body misses the target by {_mm(c.solved_target)}"
     if stopped_short(run):
-        asked = run.solve.record.get("pressure_kPa", design.pressure * 1e3)
-        walked = run.solve.record.get("control", "pressure") != "pressure"
-        reason = (
-            "ends below"
-            if walked
-            else (
-                "was asked for less than"
-                if asked < design.pressure * 1e3 * (1 - 1e-6)
-                else "stopped short of"
-            )
-        )
-        sentence += f"; it {reason} the design pressure, {plain(design.pressure * 1e3)} kPa"
-    if c.nearest and c.nearest[0] < run.solve.pressure:
-        sentence += (
-            f". Its step nearest to the target is at {plain(c.nearest[0] * 1e3)} kPa, with"
-            f" {_mm(c.nearest[1])}"
-        )
+        asked = solve.record.get("pressure_kPa", np.inf) / KPA_PER_MPA
+        reason = "stopped short of"
+        if solve.record.get("control", "pressure") != "pressure":
+            reason = "ends below"
+        elif asked < run.design.pressure * (1 - 1e-6):
+            reason = "was asked for less than"
+        sentence += f"; it {reason} the design pressure, {wanted}"
+    if c.nearest and c.nearest[0] < solve.pressure:
+        sentence += f". Its step nearest to the target is at {kPa(c.nearest[0])}, with {_mm(c.nearest[1])}"
     if overlaps(run):
         sentence = "NOT PROVEN. " + ". ".join(
             [sentence, *overlaps(run), "The finite element shape is not what a real body would take"]
@@ -236,10 +223,9 @@ def verdict(run: DesignFolder, comparison: "Comparison") -> str:
 def _strain_difference(run, comparison):
     """Largest |k_reduced - k_FE| over the segments, % of the largest |k| in FE: shows what positions do
     not."""
-    solved = np.linalg.norm(run.solve.strains.k, axis=1)
-    return 100 * float(
-        np.linalg.norm(comparison.strains.k - run.solve.strains.k, axis=1).max() / solved.max()
-    )
+    solved = run.solve.strains.k
+    away = np.linalg.norm(comparison.strains.k - solved, axis=1).max()
+    return 100 * float(away / np.linalg.norm(solved, axis=1).max())
 
 
 def _mm(errors):

@@ -2,23 +2,37 @@
 in mm."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: left, bottom, width, height in inches
+Rectangle = tuple[float, float, float, float]
+#: x0, x1, y0, y1 in mm
+Box = tuple[float, float, float, float]
+#: from, to, text of a dimension
+Interval = tuple[float, float, str]
+#: matplotlib's, or (offset, (on, off, ...)) in points
+LineStyle = str | tuple[float, tuple[float, ...]]
 INK, LINE = "#1b1f24", "#55606b"
 TEXT_SIZE = 7.5
 
 
-def text_width(text: str, size: float = TEXT_SIZE) -> None:
+def text_width(text: str, size: float = TEXT_SIZE) -> float:
     """Estimated width of a line of text in inches."""
     return 0.56 * size * len(text) / 72
 
 
-def spread(positions: Sequence[float], distance: float) -> None:
-    """Positions moved as little as needed to be `distance` apart, order kept (least squares by pooling)."""
+def spread(positions: Sequence[float], distance: float) -> np.ndarray:
+    """Positions (n,) moved as little as needed to be `distance` apart, order kept (pooled least squares)."""
     order = np.argsort(positions, kind="stable")
     wanted = np.asarray(positions, float)[order] - distance * np.arange(len(order))
-    pools = []  # (mean, count): neighbours that collide share the mean of what they want
+    #: (mean, count): neighbours that collide share the mean of what they want
+    pools: list[tuple[float, int]] = []
     for value in wanted:
         pools.append((value, 1))
         while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
@@ -30,18 +44,26 @@ def spread(positions: Sequence[float], distance: float) -> None:
 
 
 class SheetView:
-    """A rectangle (left, bottom, width, height, inches) of a figure that shows (x, y) in mm at `scale` inches
-    per mm.
+    """A rectangle of a figure that shows (x, y) in mm at `scale` inches per mm.
 
     (x, y) lies at the rectangle's middle, moved by `right` and `up` inches.
     """
 
-    def __init__(self, figure, rectangle, scale, x, y, right=0.0, up=0.0):
+    def __init__(
+        self,
+        figure: "Figure",
+        rectangle: Rectangle,
+        scale: float,
+        x: float,
+        y: float,
+        right: float = 0.0,
+        up: float = 0.0,
+    ) -> None:
         left, bottom, width, height = rectangle
         sheet_width, sheet_height = figure.get_size_inches()
         self.scale = scale
         self.ax = figure.add_axes(
-            [left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height]
+            (left / sheet_width, bottom / sheet_height, width / sheet_width, height / sheet_height)
         )
         x, y = x - right / scale, y - up / scale
         self.x0, self.x1 = x - width / 2 / scale, x + width / 2 / scale
@@ -50,7 +72,8 @@ class SheetView:
         self.ax.set_ylim(self.y0, self.y1)
         self.ax.set_axis_off()
 
-    def mm(self, inches: float) -> None:
+    def mm(self, inches: float) -> float:
+        """A distance on paper in mm of the part."""
         return inches / self.scale
 
     def text(
@@ -74,18 +97,20 @@ class SheetView:
         """A title centred at the top of the rectangle."""
         self.text((self.x0 + self.x1) / 2, self.y1 - self.mm(0.14), text, size=8.5, weight="bold")
 
-    def line(self, points: np.ndarray, width: float = 0.6, style: str = "-", colour: str = LINE) -> None:
-        x, y = zip(*points)
+    def line(self, points: ArrayLike, width: float = 0.6, style: LineStyle = "-", colour: str = LINE) -> None:
+        """Straight lines between points (n, 2)."""
+        x, y = np.asarray(points, float).T
         self.ax.plot(x, y, linewidth=width, linestyle=style, color=colour, solid_capstyle="butt")
 
     def polygon(
-        self, corners: np.ndarray, face: str, width: float = 0.8, style: str = "-", alpha: float = 1.0
+        self, corners: ArrayLike, face: str, width: float = 0.8, style: LineStyle = "-", alpha: float = 1.0
     ) -> None:
+        """A closed line through corners (n, 2) with a face."""
         from matplotlib.patches import Polygon
 
         self.ax.add_patch(
             Polygon(
-                corners,
+                np.asarray(corners, float),
                 closed=True,
                 facecolor=face,
                 edgecolor=INK if width else "none",
@@ -95,16 +120,21 @@ class SheetView:
             )
         )
 
-    def cut(self, solids: list, voids: list, colour: str, clip: tuple | None = None) -> None:
-        """A section: union of `solids` minus union of `voids`, both (x0, x1, y0, y1); broken off at the x of
-        `clip`."""
-        from matplotlib.patches import Rectangle
+    def cut(
+        self,
+        solids: Sequence[Box],
+        voids: Sequence[Box],
+        colour: str,
+        clip: tuple[float, float] | None = None,
+    ) -> None:
+        """A section: union of `solids` minus union of `voids`; broken off at the x of `clip`."""
+        from matplotlib import patches
 
         def add(box, **style):
             x0, x1, y0, y1 = box
             if clip:
                 x0, x1 = max(x0, clip[0]), min(x1, clip[1])
-            self.ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **style))
+            self.ax.add_patch(patches.Rectangle((x0, y0), x1 - x0, y1 - y0, **style))
 
         # the edges first, then the faces above them: inner halves of edges inside the union disappear
         for boxes, face in ((solids, colour), (voids, "white")):
@@ -113,7 +143,7 @@ class SheetView:
             for box in boxes:
                 add(box, facecolor=face, edgecolor="none")
         if clip:
-            low, high = min(b[2] for b in solids[:1]), max(b[3] for b in solids[:1])
+            low, high = solids[0][2:]
             for x in clip:
                 self.ax.plot([x, x], [low, high], color="white", linewidth=2.4)
                 self.ax.plot(
@@ -176,50 +206,44 @@ class SheetView:
         self._arrows((x, y0), (x, y1), (y1 - y0) * self.scale > 0.3)
         self.text(x - self.mm(0.06), (y0 + y1) / 2, text, ha="right")
 
-    def ladder(self, intervals: list, x_part: float, x: float) -> None:
-        """Neighbouring vertical dimensions (y0, y1, text) in one column at x, their labels spread apart."""
+    def ladder(self, intervals: Sequence[Interval], x_part: float, x: float) -> None:
+        """Neighbouring vertical dimensions in one column at x, their labels spread apart."""
         middles = [(a + b) / 2 for a, b, _ in intervals]
         levels = spread(middles, self.mm(0.16))
         for y in {y for a, b, _ in intervals for y in (a, b)}:
             self.line([(x_part, y), (x + self.mm(0.05), y)], width=0.35)
         for (a, b, text), middle, level in zip(intervals, middles, levels):
             self.line([(x, a), (x, b)], width=0.6)
-            for y in (a, b):
-                self.line(
-                    [(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))],
-                    width=0.9,
-                    colour=INK,
-                )
+            self._tick(x, a)
+            self._tick(x, b)
             self.line([(x, middle), (x + self.mm(0.18), level), (x + self.mm(0.24), level)], width=0.35)
             self.text(x + self.mm(0.27), level, text, ha="left")
 
-    def chain_below(self, intervals: list, y_part: float, y: float) -> None:
-        """Short neighbouring horizontal dimensions (x0, x1, text) with upright labels below the line."""
+    def chain_below(self, intervals: Sequence[Interval], y_part: float, y: float) -> None:
+        """Short neighbouring horizontal dimensions with upright labels below the line."""
         levels = spread([(a + b) / 2 for a, b, _ in intervals], self.mm(0.13))
         for (a, b, text), level in zip(intervals, levels):
             for x in (a, b):
                 self.line([(x, y_part), (x, y - self.mm(0.05))], width=0.35)
-                self.line(
-                    [(x - self.mm(0.025), y - self.mm(0.025)), (x + self.mm(0.025), y + self.mm(0.025))],
-                    width=0.9,
-                    colour=INK,
-                )
+                self._tick(x, y)
             self.line([(a, y), (b, y)], width=0.6)
             self.line([((a + b) / 2, y), (level, y - self.mm(0.08))], width=0.35)
             self.text(level, y - self.mm(0.1), text, va="top", rotation=90, size=7)
 
-    def angle(self, corner: np.ndarray, degrees: float, radius: float) -> None:
-        """The angle of a line through `corner` with the x axis: the line, an arc of `radius` inches and the
+    def _tick(self, x, y):
+        half = self.mm(0.025)
+        self.line([(x - half, y - half), (x + half, y + half)], width=0.9, colour=INK)
+
+    def angle(self, x: float, y: float, degrees: float, radius: float) -> None:
+        """The angle of a line through (x, y) with the x axis: the line, an arc of `radius` inches and the
         value."""
         from matplotlib.patches import Arc
 
-        corner, r = np.asarray(corner, float), self.mm(radius)
-        direction = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
-        self.line([corner, corner + 1.15 * r * direction], width=0.5)
-        self.line([corner, corner + [1.15 * r, 0]], width=0.5)
-        self.ax.add_patch(Arc(corner, 2 * r, 2 * r, theta1=0, theta2=degrees, color=LINE, linewidth=0.6))
-        half = np.radians(degrees / 2)
-        self.text(*(corner + 0.62 * r * np.array([np.cos(half), np.sin(half)])), f"{degrees:.4g}°", size=7)
+        r, full, half = self.mm(radius), np.radians(degrees), np.radians(degrees / 2)
+        self.line([(x, y), (x + 1.15 * r * np.cos(full), y + 1.15 * r * np.sin(full))], width=0.5)
+        self.line([(x, y), (x + 1.15 * r, y)], width=0.5)
+        self.ax.add_patch(Arc((x, y), 2 * r, 2 * r, theta1=0, theta2=degrees, color=LINE, linewidth=0.6))
+        self.text(x + 0.62 * r * np.cos(half), y + 0.62 * r * np.sin(half), f"{degrees:.4g}°", size=7)
 
     def balloon(self, x: float, y: float, number: int, text: str, colour: str) -> None:
         """A numbered circle with a line of text at its right, centred on x."""

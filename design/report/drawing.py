@@ -4,11 +4,9 @@ segments."""
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pneunet.base.files.atomic import atomic_path
-from pneunet.design.report.dimensions import SheetView
-from pneunet.design.report.labels import REDUCED, plain, segment_colour, segment_mode
+from pneunet.design.report.dimensions import INK, SheetView
+from pneunet.design.report.labels import REDUCED, kPa, plain, segment_colour, segment_mode
 from pneunet.design.report.section_views import cross_section, normal_section, section_groups, section_scale
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
@@ -16,16 +14,14 @@ from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
 SHEET_WIDTH = 16.5  # inches, the width of A3
 MARGIN = 0.45
 COLUMNS = 4  # section panels in a row
 PANEL_WIDTH = (SHEET_WIDTH - 2 * MARGIN) / COLUMNS
 PANEL_HEIGHT = 3.6
-INK = "#1b1f24"
 
 
-def segment_table(manipulator: Manipulator) -> list:
+def segment_table(manipulator: Manipulator) -> list[tuple[str, list[str]]]:
     """Rows (label, [text for every segment]) of all dimensions, lengths in mm, for the drawing and the
     report."""
 
@@ -69,9 +65,10 @@ def segment_table(manipulator: Manipulator) -> list:
     ]
 
 
-def chamber_plan(segment: Segment, x: float, thickness: float, half_width: float, side: int) -> np.ndarray:
-    """Plan corners (4, 2) in mm of a chamber or cavity centred at x; side -1 is the set turned half a turn
-    about x."""
+def chamber_plan(
+    segment: Segment, x: float, thickness: float, half_width: float, side: int
+) -> list[tuple[float, float]]:
+    """Four plan corners in mm of a chamber or cavity centred at x; side -1: turned half a turn about x."""
     half, slant = thickness / segment.sin / 2, segment.cot * half_width * side
     return [
         (x - slant - half, -half_width),
@@ -97,14 +94,9 @@ def drawing_figure(design: DesignFile) -> "Figure":
     rows = segment_table(manipulator)
     scale = min((SHEET_WIDTH - 2 * MARGIN - 1.7) / manipulator.length, 0.16)
     plan_height = scale * max(s.width for s in manipulator.segments) + 1.9
-    side_height = (
-        scale
-        * (
-            max(s.chamber_top for s in manipulator.segments)
-            - min(s.chamber_bottom for s in manipulator.segments)
-        )
-        + 1.7
-    )
+    highest = max(s.chamber_top for s in manipulator.segments)
+    lowest = min(s.chamber_bottom for s in manipulator.segments)
+    side_height = scale * (highest - lowest) + 1.7
     panel_rows = -(-(2 * len(groups) + 2) // COLUMNS)
     height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
     figure = Figure(figsize=(SHEET_WIDTH, height), facecolor="white")
@@ -112,33 +104,12 @@ def drawing_figure(design: DesignFile) -> "Figure":
 
     top = height - MARGIN - 0.75
     width = SHEET_WIDTH - 2 * MARGIN
-    _plan(
-        SheetView(
-            figure,
-            (MARGIN, top - plan_height, width, plan_height),
-            scale,
-            manipulator.length / 2,
-            0.0,
-            up=-0.4,
-        ),
-        manipulator,
-    )
+    middle = manipulator.length / 2
     top -= plan_height
-    middle = (
-        max(s.chamber_top for s in manipulator.segments) + min(s.chamber_bottom for s in manipulator.segments)
-    ) / 2
-    _side(
-        SheetView(
-            figure,
-            (MARGIN, top - side_height, width, side_height),
-            scale,
-            manipulator.length / 2,
-            middle,
-            up=0.48,
-        ),
-        manipulator,
-    )
+    _plan(SheetView(figure, (MARGIN, top, width, plan_height), scale, middle, 0.0, up=-0.4), manipulator)
     top -= side_height
+    rectangle = (MARGIN, top, width, side_height)
+    _side(SheetView(figure, rectangle, scale, middle, (highest + lowest) / 2, up=0.48), manipulator)
 
     panels = [(draw, group) for group in groups for draw in (cross_section, normal_section)]
     panel_scale = min(section_scale(manipulator.segments[g[0]], PANEL_WIDTH, PANEL_HEIGHT) for g in groups)
@@ -164,7 +135,7 @@ def _frame(figure, design, height):
     facts = (
         f"pneu-net soft manipulator, {len(manipulator.segments)}"
         f" segment{'s' * (len(manipulator.segments) > 1)}, {manipulator.chambers} chambers/pairs, total"
-        f" length {plain(manipulator.length)} mm, design pressure {plain(design.pressure * 1e3)} kPa"
+        f" length {plain(manipulator.length)} mm, design pressure {kPa(design.pressure)}"
     )
     figure.text(x, y - 0.33 / height, facts, fontsize=10, color=INK, va="top")
     figure.text(1 - x, y, "all dimensions in mm", fontsize=10, color=INK, va="top", ha="right")
@@ -206,7 +177,7 @@ def _plan(view, manipulator):
         for y in (-s.channel_width / 2, s.channel_width / 2):
             view.line([(x0, y), (x1, y)], width=0.6, style=(0, (5, 2)))
         first = start + s.chamber_positions[0]
-        view.angle((first + half * s.cot, half), s.angle, 0.42)
+        view.angle(first + half * s.cot, half, s.angle, 0.42)
         level = highest + view.mm(0.92 + (0.3 if short and i % 2 else 0.0))
         view.balloon(
             start + s.length / 2, level, i + 1, f"{segment_mode(s)} {plain(s.angle)}°", segment_colour(i)
@@ -214,14 +185,14 @@ def _plan(view, manipulator):
         if s.chambers > 1:
             x = first - half * s.cot
             view.horizontal(x, x + s.pitch, -half, -half - view.mm(0.3), f"pitch {plain(s.pitch)}")
-    view.line(
-        [(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)],
-        width=0.6,
-        style=(0, (12, 3, 2, 3)),
-        colour=REDUCED,
-    )
+    _axis(view, manipulator)
     view.text(-view.mm(0.28), 0, "base", ha="right")
     view.text(manipulator.length + view.mm(0.28), 0, "tip", ha="left")
+
+
+def _axis(view, manipulator):
+    over = view.mm(0.25)
+    view.line([(-over, 0), (manipulator.length + over, 0)], style=(0, (12, 3, 2, 3)), colour=REDUCED)
 
 
 def _side(view, manipulator):
@@ -254,12 +225,7 @@ def _side(view, manipulator):
         a, b = start + s.end_length, start + s.end_length + s.active_length
         ends += [(start, a, plain(s.end_length)), (b, start + s.length, plain(s.end_length))]
         lengths.append((start, start + s.length, plain(s.length), (a, b, plain(s.active_length))))
-    view.line(
-        [(-view.mm(0.25), 0), (manipulator.length + view.mm(0.25), 0)],
-        width=0.6,
-        style=(0, (12, 3, 2, 3)),
-        colour=REDUCED,
-    )
+    _axis(view, manipulator)
     low = min(s.chamber_bottom for s in manipulator.segments)
     view.chain_below(ends, low, low - view.mm(0.25))
     for start, stop, text, (a, b, active) in lengths:

@@ -8,55 +8,46 @@ from pneunet.base.errors import ConvergenceError
 from pneunet.base.pictures import rendering
 from pneunet.base.pictures.rendering import figure, save
 from pneunet.base.pictures.walls import TOUCHING, draw_walls
+from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.design.report import bodies
 from pneunet.design.report.comparison import Comparison
 from pneunet.design.report.drawing import chamber_plan
-from pneunet.design.report.labels import FINITE_ELEMENTS, plain, segment_colour
+from pneunet.design.report.labels import FINITE_ELEMENTS, kPa, segment_colour
 from pneunet.design.report.pictures import curve_panels, legend, segment_bands
-from pneunet.design.report.rundata import DesignFolder
+from pneunet.design.report.rundata import DesignFolder, Solution
+from pneunet.geometry.designfile import DesignFile
+from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced import predict
 from pneunet.reduced.rod.laws import SegmentLaw
 
 
-def _mark(run):
-    """What the titles of finite element pictures end with when parts overlap in them."""
-    return " (overlaps)" * bool(run.solve and (run.solve.walls_overlap or run.solve.body_overlap))
+def _at(solve):
+    """End of the titles of finite element pictures: the pressure, and whether parts overlap in them."""
+    return kPa(solve.pressure) + " (overlaps)" * (solve.walls_overlap or solve.body_overlap)
 
 
 def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> list[tuple[str, str]]:
     """Target, reduced and finite element centrelines over each other."""
-    design = run.design
-    curves = []
+    design, solve, solved = run.design, run.solve, comparison.solved
+    curves, bands = [], []
     if run.target is not None:
         curves.append(("target", run.target, "target"))
-    reduced, pressure = comparison.reduced, design.pressure
-    if comparison.solved is not None:
-        reduced, pressure = comparison.reduced_at_solve, run.solve.pressure
+    reduced = comparison.reduced if solve is None else comparison.reduced_at_solve
     if reduced is not None:
-        curves.append((f"reduced, {plain(pressure * 1e3)} kPa", reduced, "reduced"))
-    bands = None
-    if comparison.solved is not None:
-        label = f"finite elements, {plain(pressure * 1e3)} kPa{_mark(run)}"
-        curves.append((label, comparison.solved, "finite elements"))
-        s = np.linspace(run.solve.s[0], run.solve.s[-1], len(comparison.solved))
-        bands = segment_bands(design.manipulator, s, comparison.solved)
+        pressure = design.pressure if solve is None else solve.pressure
+        curves.append((f"reduced, {kPa(pressure)}", reduced, "reduced"))
+    if solve is not None and solved is not None:
+        curves.append((f"finite elements, {_at(solve)}", solved, "finite elements"))
+        s = np.linspace(solve.s[0], solve.s[-1], len(solved))
+        bands = segment_bands(design.manipulator, s, solved)
     if not curves:
         return []
     fig = figure(11.0, 6.2)
     curve_panels(fig, curves, bands)
     legend(fig, curves, design.manipulator)
     save(fig, folder / "curves.png", dpi=110)
-    where = "finite element curve" if bands else "picture"
-    return [
-        (
-            "curves.png",
-            (
-                f"Centrelines in 3D and in two projections, equal scale; segments coloured along the {where}."
-                if bands
-                else "Centrelines in 3D and in two projections, equal scale."
-            ),
-        )
-    ]
+    coloured = "; segments coloured along the finite element curve" if bands else ""
+    return [("curves.png", f"Centrelines in 3D and in two projections, equal scale{coloured}.")]
 
 
 def body_pictures(
@@ -64,30 +55,26 @@ def body_pictures(
 ) -> list[tuple[str, str]]:
     """Target, reduced body, finite element body and the reference body from one camera at one scale; fields
     on the finite element body."""
-    design = run.design
-    pressure = run.solve.pressure if run.solve else design.pressure
+    design, solve = run.design, run.solve
+    pressure = design.pressure if solve is None else solve.pressure
     reduced = None
-    if (comparison.reduced_at_solve if run.solve else comparison.reduced) is not None:
+    if (comparison.reduced if solve is None else comparison.reduced_at_solve) is not None:
         reduced = bodies.body_mesh(design.manipulator, pressure, law, design.base_pose)
     rest = bodies.body_mesh(design.manipulator, 0.0, law, design.base_pose)
     solved = None
-    if run.solve is not None and run.solve.solution is not None:
-        solved, solved_edges = bodies.deformed_surface(
-            bodies.read_solution(run.solve.solution), design.base_pose
-        )
-    target = None if run.target is None else bodies.tube(run.target)
+    if solve is not None and solve.solution is not None:
+        solved, solved_edges = bodies.deformed_surface(bodies.read_solution(solve.solution), design.base_pose)
+    with_target = [] if run.target is None else [bodies.tube(run.target)]
     curves = [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
     held = [m.points for m in (reduced, solved) if m is not None] + curves
     view = rendering.view_of(np.vstack(held or [rest.points]))
-    kPa = f"{plain(pressure * 1e3)} kPa"
-    with_target = [target] if target else []
     out = []
 
     def picture(name, things, title, caption, bar=None):
         rendering.write_picture(folder / name, view, rendering.render(view, things), title, bar)
         out.append((name, caption))
 
-    if target:
+    if with_target:
         picture(
             "target.png",
             with_target,
@@ -99,15 +86,15 @@ def body_pictures(
         picture(
             "reduced.png",
             bodies.painted(reduced) + with_target,
-            f"reduced model, {kPa}",
+            f"reduced model, {kPa(pressure)}",
             "The reduced model's body, coloured by segment.",
         )
-    if solved is not None:
+    if solve is not None and solved is not None:
         plainly = {"color": FINITE_ELEMENTS, "opacity": 1.0}
         picture(
             "fe.png",
             [(solved, plainly), solved_edges, *with_target],
-            f"finite elements, {kPa}{_mark(run)}",
+            f"finite elements, {_at(solve)}",
             "The finite element body.",
         )
         for name, field, label, cmap in (
@@ -125,11 +112,11 @@ def body_pictures(
                 else ""
             )
             if field == "stretch":
-                beyond += f"; the largest inside the elements is {run.solve.steps['largest_stretch'][-1]:.2f}"
+                beyond += f"; the largest inside the elements is {solve.steps['largest_stretch'][-1]:.2f}"
             picture(
                 name,
                 [rendering.coloured(solved, field, limits, cmap), solved_edges],
-                f"{label.split(' (')[0]}, {kPa}{_mark(run)}",
+                f"{label.split(' (')[0]}, {_at(solve)}",
                 f"Finite element body coloured by {label.split(' (')[0]}{beyond}.",
                 (label, limits, cmap),
             )
@@ -144,19 +131,20 @@ def body_pictures(
     return out
 
 
-def history_picture(run: DesignFolder, law: SegmentLaw, folder: Path) -> list[tuple[str, str]]:
+def history_picture(
+    design: DesignFile, solve: Solution, law: SegmentLaw, folder: Path
+) -> list[tuple[str, str]]:
     """Tip, volume, wall distance and stretch against pressure; the reduced tip dashed."""
-    steps, design = run.solve.steps, run.design
+    steps = solve.steps
     p = steps["pressure_kPa"]
     fig = figure(10.0, 6.6)
     axes = fig.subplots(2, 2)
-    tips = []
-    for level in np.linspace(0, p.max(), 15):
+    levels, tips = np.linspace(0, p.max(), 15), []
+    for level in levels:
         try:
-            tips.append((level, *predict(design.manipulator, level * 1e-3, law).points[-1]))
+            tips.append(predict(design.manipulator, level * MPA_PER_KPA, law).points[-1])
         except ConvergenceError:
             break
-    tips = np.array(tips)
     for i, (name, colour) in enumerate(zip("xyz", ("#1f6fb2", "#2f9e44", "#d9480f"))):
         axes[0, 0].plot(
             p,
@@ -167,10 +155,9 @@ def history_picture(run: DesignFolder, law: SegmentLaw, folder: Path) -> list[tu
             linewidth=1.4,
             label=f"{name}, finite elements",
         )
-        if len(tips):
-            axes[0, 0].plot(
-                tips[:, 0], tips[:, i + 1], "--", color=colour, linewidth=1.2, label=f"{name}, reduced"
-            )
+        if tips:
+            reduced, label = [tip[i] for tip in tips], f"{name}, reduced"
+            axes[0, 0].plot(levels[: len(tips)], reduced, "--", color=colour, linewidth=1.2, label=label)
     axes[0, 0].set_ylabel("tip, body axes (mm)")
     axes[0, 0].legend(fontsize=7, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
     for ax, column, label in (
@@ -199,7 +186,7 @@ def history_picture(run: DesignFolder, law: SegmentLaw, folder: Path) -> list[tu
     axes[1, 0].axhspan(axes[1, 0].get_ylim()[0], 0.0, color="#c92a2a", alpha=0.12)
     for ax in axes.flat:
         ax.set_xlabel("pressure (kPa)")
-        ax.axvline(design.pressure * 1e3, color="#868e96", linewidth=0.9, linestyle=":")
+        ax.axvline(design.pressure * KPA_PER_MPA, color="#868e96", linewidth=0.9, linestyle=":")
         ax.set_xlim(left=0.0)
         ax.grid(True, linewidth=0.4, alpha=0.6)
     fig.subplots_adjust(left=0.08, right=0.98, top=0.92, bottom=0.08, wspace=0.24, hspace=0.28)
@@ -215,20 +202,18 @@ def history_picture(run: DesignFolder, law: SegmentLaw, folder: Path) -> list[tu
     ]
 
 
-def touching_picture(run: DesignFolder, folder: Path) -> list[tuple[str, str]]:
+def touching_picture(design: DesignFile, solve: Solution, folder: Path) -> list[tuple[str, str]]:
     """The deformed body, its facing walls coloured by their distance; [] without fields or gaps."""
-    if run.solve.solution is None:
+    if solve.solution is None:
         return []
-    surface, (lines, _) = bodies.deformed_surface(
-        bodies.read_solution(run.solve.solution), run.design.base_pose
-    )
+    surface, (lines, _) = bodies.deformed_surface(bodies.read_solution(solve.solution), design.base_pose)
     walls = bodies.facing_walls(surface)
     if walls is None:
         return []
-    gap = max(s.gap for s in run.design.manipulator.segments)
-    touching = TOUCHING * gap * run.solve.contact
+    gap = max(s.gap for s in design.manipulator.segments)
+    touching = TOUCHING * gap * solve.contact
     around = f"is nearer than {touching:.2g} mm: contact" if touching else "lies behind the other: overlap"
-    title = f"distance of walls, {plain(run.solve.pressure * 1e3)} kPa{_mark(run)}"
+    title = f"distance of walls, {_at(solve)}"
     draw_walls(folder / "fe_walls.png", surface, lines, walls, gap, title, touching)
     return [
         (
@@ -241,21 +226,21 @@ def touching_picture(run: DesignFolder, folder: Path) -> list[tuple[str, str]]:
     ]
 
 
-def wall_picture(run: DesignFolder, folder: Path) -> list[tuple[str, str]]:
+def wall_picture(manipulator: Manipulator, solve: Solution, folder: Path) -> list[tuple[str, str]]:
     """Plan strips of the upper and the lower side, every gap coloured by the smallest distance of its
     walls."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import TwoSlopeNorm
     from matplotlib.patches import Polygon
 
-    manipulator = run.design.manipulator
-    walls = {(a, b, c): d for a, b, c, d in run.solve.walls}
+    walls = {(a, b, c): d for a, b, c, d in solve.walls}
     if not walls:
         return []
     sides = sorted({side for _, side, _ in walls}, reverse=True)
     top = max(s.gap for s in manipulator.segments)
     # red = overlap, white = touching, blue = open; the scale reaches as far down as the deepest overlap
     norm = TwoSlopeNorm(0.0, min(-0.25 * top, *walls.values()), max(top, *walls.values()))
+    colours = ScalarMappable(norm, "RdBu")
     half = max(s.width for s in manipulator.segments) / 2
     strip = 9.6 * (2 * half + 3) / manipulator.length
     height = len(sides) * (strip + 0.45) + 0.95
@@ -289,12 +274,12 @@ def wall_picture(run: DesignFolder, folder: Path) -> list[tuple[str, str]]:
                     ax.add_patch(
                         Polygon(
                             chamber_plan(s, x, s.gap, w, side),
-                            facecolor=ScalarMappable(norm, "RdBu").to_rgba(distance),
+                            facecolor=colours.to_rgba(np.asarray(distance)),
                             edgecolor="#212529",
                             linewidth=0.7,
                         )
                     )
-                    if distance < 0 and not run.solve.contact:
+                    if distance < 0 and not solve.contact:
                         ax.plot(
                             x + w * s.cot * side, w + 1.2, "v", color="#c92a2a", markersize=6, clip_on=False
                         )
@@ -311,7 +296,7 @@ def wall_picture(run: DesignFolder, folder: Path) -> list[tuple[str, str]]:
         for edge in ("left", "right", "top"):
             ax.spines[edge].set_visible(False)
     fig.colorbar(
-        ScalarMappable(norm, "RdBu"),
+        colours,
         cax=fig.add_axes([0.25, 0.45 / height, 0.5, 0.13 / height]),
         orientation="horizontal",
         label="smallest distance of the walls facing each other (mm); negative = overlap",

@@ -2,10 +2,11 @@
 
 import math
 
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.parameters import TWISTING, Segment
 
 TARGET, REDUCED, FINITE_ELEMENTS = "#30363d", "#1f6fb2", "#d9480f"
-STYLES = {
+STYLES: dict[str, dict] = {
     "target": {"color": TARGET, "linestyle": (0, (4, 2)), "linewidth": 1.8},
     "reduced": {"color": REDUCED, "linestyle": "-", "linewidth": 2.0},
     "finite elements": {"color": FINITE_ELEMENTS, "linestyle": "-", "linewidth": 2.0},
@@ -22,6 +23,11 @@ def plain(value: float, decimals: int = 2) -> str:
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return "0" if text in ("-0", "") else text
+
+
+def kPa(pressure: float) -> str:
+    """A pressure in MPa: 0.035 -> '35 kPa'."""
+    return f"{plain(pressure * KPA_PER_MPA)} kPa"
 
 
 def significant(value: float, digits: int = 4) -> str:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pneunet.base.pictures.rendering import camera_angles, figure
-from pneunet.base.units import KPA_PER_MPA
-from pneunet.design.report.labels import STYLES, plain, segment_colour, segment_name, significant
+from pneunet.design.report.labels import STYLES, kPa, plain, segment_colour, segment_name, significant
 from pneunet.design.target.metrics import Errors
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile
@@ -16,14 +15,16 @@ from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.rod.centreline import Centreline
 
 if TYPE_CHECKING:
-    from mpl_toolkits.mplot3d.axes3d import Axes
-
-
-if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+#: label, points (n, 3) in mm, style of STYLES
+Line = tuple[str, np.ndarray, str]
+#: colour, points (n, 3) in mm: a stretch of a centreline that belongs to a segment
+Band = tuple[str, np.ndarray]
 
 
-def equal_axes_3d(ax: "Axes", points: np.ndarray, pad: float = 0.06) -> None:
+def equal_axes_3d(ax: "Axes3D", points: np.ndarray, pad: float = 0.06) -> None:
     """Limits of 3D axes that hold points (n, 3) at one scale in x, y and z; labels in mm."""
     from matplotlib.ticker import MaxNLocator
 
@@ -40,20 +41,18 @@ def equal_axes_3d(ax: "Axes", points: np.ndarray, pad: float = 0.06) -> None:
     ax.tick_params(labelsize=8, pad=1)
 
 
-def curve_panels(figure: "Figure", curves: list, segments: Sequence = None, bottom: float = 0.06) -> None:
-    """3D view and the x-y and x-z projections of curves.
-
-    curves : [(label, points (n, 3) in mm, style of STYLES)]. segments : [(colour, points)], bands under the
-    curves.
-    """
+def curve_panels(
+    figure: "Figure", curves: Sequence[Line], segments: Sequence[Band] = (), bottom: float = 0.06
+) -> None:
+    """3D view and the x-y and x-z projections of curves, with the bands of segments under them."""
     everything = np.vstack([points for _, points, _ in curves])
     grid = figure.add_gridspec(
         2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32
     )
     ax = figure.add_subplot(grid[:, 0], projection="3d")
     ax.view_init(*camera_angles(everything))
-    band = {"linewidth": 9, "alpha": 0.75, "solid_capstyle": "butt", "zorder": 1}
-    for colour, points in segments or []:
+    band: dict = {"linewidth": 9, "alpha": 0.75, "solid_capstyle": "butt", "zorder": 1}
+    for colour, points in segments:
         ax.plot(*points.T, color=colour, **band)
     for label, points, style in curves:
         ax.plot(*points.T, label=label, **STYLES[style])
@@ -62,7 +61,7 @@ def curve_panels(figure: "Figure", curves: list, segments: Sequence = None, bott
     equal_axes_3d(ax, everything)
     for row, (i, j) in enumerate([(0, 1), (0, 2)]):
         ax = figure.add_subplot(grid[row, 1])
-        for colour, points in segments or []:
+        for colour, points in segments:
             ax.plot(points[:, i], points[:, j], color=colour, **band)
         for _, points, style in curves:
             ax.plot(points[:, i], points[:, j], **STYLES[style])
@@ -75,10 +74,8 @@ def curve_panels(figure: "Figure", curves: list, segments: Sequence = None, bott
         ax.tick_params(labelsize=8)
 
 
-def segment_bands(
-    manipulator: Manipulator, s: np.ndarray, points: np.ndarray
-) -> list[tuple[str, np.ndarray]]:
-    """[(colour, points)] of the stretches of a centreline (s undeformed, mm) that belong to each segment."""
+def segment_bands(manipulator: Manipulator, s: np.ndarray, points: np.ndarray) -> list[Band]:
+    """The Band of each segment on a centreline: s (n,) undeformed, points (n, 3), mm."""
     ends = manipulator.starts + [seg.length for seg in manipulator.segments]
     bands = []
     for i, (start, end) in enumerate(zip(manipulator.starts, ends)):
@@ -89,7 +86,7 @@ def segment_bands(
     return bands
 
 
-def legend(figure: "Figure", curves: list, manipulator: Manipulator) -> None:
+def legend(figure: "Figure", curves: Sequence[Line], manipulator: Manipulator) -> None:
     """At the top right: what the lines are, and below it the segments' colours with their names."""
     from matplotlib.lines import Line2D
 
@@ -139,7 +136,7 @@ def design_figure(
     curve_panels(fig, curves, segment_bands(body, line.s, line.points), bottom=0.15)
     legend(fig, curves, body)
     fig.text(0.025, 0.975, content.name, fontsize=15, weight="bold", va="top")
-    told = f"{plain(content.pressure * KPA_PER_MPA)} kPa, {body.chambers} chambers"
+    told = f"{kPa(content.pressure)}, {body.chambers} chambers"
     fig.text(0.025, 0.925, f"{told}, {plain(body.length, 1)} mm long at rest", fontsize=10, va="top")
     fig.text(0.025, 0.02, caption, fontsize=9, linespacing=1.5)
     return fig

@@ -9,10 +9,11 @@ import numpy as np
 
 from pneunet.base.files.atomic import output_directory, write_text
 from pneunet.base.files.record import revision
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report import figures
 from pneunet.design.report.comparison import CONFIRMS, ROUGHLY, Comparison, overlaps, stopped_short, verdict
 from pneunet.design.report.drawing import draw_drawing, segment_table
-from pneunet.design.report.labels import plain, segment_name, significant
+from pneunet.design.report.labels import kPa, plain, segment_name, significant
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.laws import SegmentLaw
@@ -138,7 +139,7 @@ def _headline(run, comparison):
     names = ", ".join(segment_name(s) for s in m.segments)
     designed = (
         f"{len(m.segments)} segment{'s' * (len(m.segments) > 1)} ({names}), {m.length:.1f} mm long at rest, "
-        f"{m.segments[0].width:g} mm wide, one pressure of {plain(design.pressure * 1e3)} kPa."
+        f"{m.segments[0].width:g} mm wide, one pressure of {kPa(design.pressure)}."
     )
     out = (
         f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b>"
@@ -179,9 +180,9 @@ def _shapes(run, comparison, law, folder):
 
 
 def _errors(comparison, run):
-    at = f" at {plain(run.solve.pressure * 1e3)} kPa" if run.solve else ""
+    at = f" at {kPa(run.solve.pressure)}" if run.solve else ""
     columns = [
-        (f"reduced vs target at {plain(run.design.pressure * 1e3)} kPa", comparison.reduced_target),
+        (f"reduced vs target at {kPa(run.design.pressure)}", comparison.reduced_target),
         (f"FE vs target{at}", comparison.solved_target),
         (f"reduced vs FE{at}", comparison.reduced_solved),
     ]
@@ -222,7 +223,7 @@ def _strains(run, comparison):
         ("Frenet curvature |k x e|/|e|², 1/m", lambda s: s.frenet_curvature, 1e3, 2),
         ("torsion k.e/|e|² (a twisting segment's tau), rad/m", lambda s: s.frenet_torsion, 1e3, 2),
     ]
-    rows = []
+    rows: list[str | list[str]] = []
     for i, segment in enumerate(run.design.manipulator.segments):
         rows.append(f"segment {i + 1}: {segment_name(segment)}")
         for label, of, unit, digits in quantities:
@@ -233,7 +234,7 @@ def _strains(run, comparison):
             rows.append([label, told, _fixed(fe, digits), ratio])
     return (
         _alarms(run)
-        + _table([f"at {plain(run.solve.pressure * 1e3)} kPa", "reduced", "FE", "FE / reduced"], rows)
+        + _table([f"at {kPa(run.solve.pressure)}", "reduced", "FE", "FE / reduced"], rows)
         + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not"
         " depend on that choice.</p>"
     )
@@ -247,13 +248,14 @@ def _fixed(value, digits):
 def _history(run, law, folder):
     if run.solve is None:
         return _missing("No finite element solution yet.")
-    return "".join(_image(folder, *p) for p in figures.history_picture(run, law, folder))
+    return "".join(_image(folder, *p) for p in figures.history_picture(run.design, run.solve, law, folder))
 
 
 def _walls(run, folder):
     if run.solve is None:
         return _missing("No wall distances: there is no finite element solution yet.")
-    solve, distances = run.solve, [d for *_, d in run.solve.walls]
+    solve = run.solve
+    distances = [d for *_, d in solve.walls]
     out, touching = _alarms(run), sum(d < 0 for d in distances)
     if touching and solve.contact:
         out += f"<p>Walls touch in {touching} of {len(distances)} gaps, held apart by a contact model.</p>"
@@ -269,12 +271,12 @@ def _walls(run, folder):
         )
     if not distances:
         return out + _missing("No wall distances: the body has no gaps.")
-    out += "".join(
-        _image(folder, *p) for p in figures.touching_picture(run, folder) + figures.wall_picture(run, folder)
-    )
+    pictures = figures.touching_picture(run.design, solve, folder)
+    pictures += figures.wall_picture(run.design.manipulator, solve, folder)
+    out += "".join(_image(folder, *p) for p in pictures)
     rows = []
-    for key in sorted({(a, b) for a, b, _, _ in run.solve.walls}, key=lambda k: (k[0], -k[1])):
-        here = [(d, gap) for a, b, gap, d in run.solve.walls if (a, b) == key]
+    for key in sorted({(a, b) for a, b, _, _ in solve.walls}, key=lambda k: (k[0], -k[1])):
+        here = [(d, gap) for a, b, gap, d in solve.walls if (a, b) == key]
         distance, gap = min(here)
         rest = run.design.manipulator.segments[key[0] - 1].gap
         rows.append(
@@ -331,7 +333,7 @@ def _computed(run):
             ["Newton iterations", int(steps["iterations"].sum())],
             ["factorisations", int(steps["factorisations"].sum())],
             ["seconds in steps", f"{steps['seconds'][-1]:.1f}"],
-            ["last pressure, kPa", plain(run.solve.pressure * 1e3)],
+            ["last pressure, kPa", plain(run.solve.pressure * KPA_PER_MPA)],
             ["reached the design pressure", "no" if stopped_short(run) else "yes"],
             ["walls overlap", "yes" if solve.walls_overlap else "no"],
             ["far parts of the body overlap", "yes" if solve.body_overlap else "no"],

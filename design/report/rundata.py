@@ -1,6 +1,5 @@
 """What stands in a run directory, read for pictures and the report; parts that are not there yet are None."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files import schemas
+from pneunet.base.files.record import read_record
 from pneunet.base.files.schemas import read_table
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
@@ -15,7 +15,7 @@ from pneunet.geometry.designfile import DesignFile, body_tables, read_design_fil
 from pneunet.reduced.choice import TRAINED
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solution:
     """The finite element solution. Lengths in mm, body frame; kPa as in the files.
 
@@ -33,8 +33,8 @@ class Solution:
     s: np.ndarray
     points: np.ndarray
     strains: RodStrains
-    history: list
-    walls: list
+    history: list[tuple[float, np.ndarray, np.ndarray]]
+    walls: list[tuple[int, int, int, float]]
     solution: Path | None
     record: dict
 
@@ -71,7 +71,7 @@ class Solution:
         return bool(self.record.get("contact", False))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DesignFolder:
     """directory; design; target (n, 3) and centreline (s (m,), points (m, 3)) in target coordinates; mesh,
     record: the JSON files; solve; stale: the folder holds a solution of another body, or under other loads,
@@ -80,7 +80,7 @@ class DesignFolder:
     directory: Path
     design: DesignFile
     target: np.ndarray | None
-    centreline: tuple | None
+    centreline: tuple[np.ndarray, np.ndarray] | None
     record: dict
     mesh: dict
     solve: Solution | None
@@ -105,23 +105,13 @@ def read_design_folder(directory: str | Path) -> "DesignFolder":
     return DesignFolder(
         directory,
         design,
-        _columns(read_table(target, schemas.TARGET), schemas.TARGET) if target.is_file() else None,
+        _columns(read_table(target, schemas.POINT), schemas.POINT) if target.is_file() else None,
         _centreline(read_table(centreline, schemas.CENTRELINE)) if centreline.is_file() else None,
-        _json(directory / "run.json"),
-        _json(directory / "mesh" / "mesh.json"),
+        read_record(directory / "run.json"),
+        read_record(directory / "mesh" / "mesh.json"),
         None if stale else solve,
         stale,
     )
-
-
-def _json(path):
-    """The JSON object in a file; {} when it is not there."""
-    if not path.is_file():
-        return {}
-    try:
-        return json.loads(path.read_text())
-    except ValueError as error:
-        raise InputError(f"{path}: not valid JSON ({error})") from None
 
 
 def _solve(directory):
@@ -148,7 +138,7 @@ def _solve(directory):
         ],
         walls=_walls(directory / "walls.csv"),
         solution=solution if solution.is_file() else None,
-        record=_json(directory / "run.json"),
+        record=read_record(directory / "run.json"),
     )
 
 

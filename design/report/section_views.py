@@ -2,21 +2,20 @@
 
 from typing import TYPE_CHECKING
 
-from pneunet.design.report.dimensions import SheetView
+from pneunet.design.report.dimensions import Interval, Rectangle, SheetView
 from pneunet.design.report.labels import plain, segment_colour
 from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
 ROW = 0.24  # inches between dimension lines
 
 
-def section_groups(manipulator: Manipulator) -> list:
+def section_groups(manipulator: Manipulator) -> list[list[int]]:
     """Lists of segment indices that share the same cross-section (everything but angle, number, ends and
     material)."""
-    groups = {}
+    groups: dict[tuple, list[int]] = {}
     for i, s in enumerate(manipulator.segments):
         key = (
             s.kind,
@@ -52,7 +51,7 @@ def _named(group, what):
 
 
 def cross_section(
-    figure: "Figure", rectangle: tuple, scale: float, manipulator: Manipulator, group: list
+    figure: "Figure", rectangle: Rectangle, scale: float, manipulator: Manipulator, group: list[int]
 ) -> None:
     """Section through a chamber, seen along x."""
     s = manipulator.segments[group[0]]
@@ -86,21 +85,19 @@ def cross_section(
     )
     view.horizontal(-half, half, low, low - view.mm(0.2 + ROW), f"width {plain(s.width)}")
     view.vertical(low, top, -half, -half - view.mm(0.25), f"{plain(top - low)}")
-    core = [
-        (-s.channel_height / 2, s.channel_height / 2, f"channel {plain(s.channel_height)}"),
-        (s.channel_height / 2, s.core_top, f"roof {plain(s.roof)}"),
-    ]
-    below = "roof" if s.kind == TWISTING else "base"
     if s.layer_thickness:
         view.horizontal(-half, half, s.layer_top, s.layer_top, f"layer {plain(s.layer_thickness)}")
-    core.insert(
-        0, (s.core_bottom, -s.channel_height / 2, f"{below} {plain(-s.channel_height / 2 - s.core_bottom)}")
-    )
+    below, r = "roof" if s.kind == TWISTING else "base", s.channel_height / 2
+    core = [
+        (s.core_bottom, -r, f"{below} {plain(-r - s.core_bottom)}"),
+        (-r, r, f"channel {plain(s.channel_height)}"),
+        (r, s.core_top, f"roof {plain(s.roof)}"),
+    ]
     view.ladder(core, half, half + view.mm(0.2))
 
 
 def normal_section(
-    figure: "Figure", rectangle: tuple, scale: float, manipulator: Manipulator, group: list
+    figure: "Figure", rectangle: Rectangle, scale: float, manipulator: Manipulator, group: list[int]
 ) -> None:
     """Section across the chambers on the channel axis."""
     s = manipulator.segments[group[0]]
@@ -129,7 +126,7 @@ def normal_section(
         view.horizontal(s.chamber_thickness, step, low, y - view.mm(2 * ROW), f"gap {plain(s.gap)}")
         view.horizontal(0.0, step, top, top + view.mm(0.2), f"normal pitch {plain(step)}")
     edge = stop + margin
-    heights = [
+    heights: list[Interval] = [
         (s.cavity_floor, s.cavity_top, f"chamber {plain(s.chamber_height)}"),
         (s.cavity_top, s.chamber_top, f"top wall {plain(s.top_wall)}"),
     ]

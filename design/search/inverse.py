@@ -14,12 +14,13 @@ from scipy.optimize import least_squares
 from pneunet.base import se3
 from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.lookup import first_guesses
 from pneunet.design.search.problem import EQ27, OBJECTIVES, PAIRED, PAIRS, Calls, Problem, Trial
 from pneunet.design.search.space import Variable, grid, limits, prototype
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import PRESSURE_LIMIT, Target
-from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.laws import SegmentLaw
 
@@ -44,8 +45,8 @@ class Found:
     pressure: float
     base_pose: np.ndarray
     cost: float
-    active: tuple
-    grown: tuple
+    active: tuple[str, ...]
+    grown: tuple[str, ...]
     evaluations: int
 
 
@@ -63,7 +64,7 @@ def search(target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objecti
             "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
         )
     log.info(
-        f"lookup table: first guess at {1e3 * guesses[0].pressure:.1f} kPa, angles "
+        f"lookup table: first guess at {KPA_PER_MPA * guesses[0].pressure:.1f} kPa, angles "
         + _angles(guesses[0].segments)
     )
     run = _Run.start(target, pieces, law, guesses[0]).optimised(real_counts=True)
@@ -103,9 +104,9 @@ class _Run:
     """A problem, its variables with their present values and ranges, and the cost there."""
 
     problem: Problem
-    variables: tuple
+    variables: tuple[Variable, ...]
     cost: float = np.inf
-    grown: tuple = ()
+    grown: tuple[str, ...] = ()
     evaluations: int = 0
 
     @classmethod
@@ -113,13 +114,10 @@ class _Run:
         """From an entry of the lookup table, with the base turned to the target."""
         variables = []
         for i, (piece, segment) in enumerate(zip(pieces, guess.segments)):
+            preferred = prototype(target, piece)
             for name, ((low, high), (least, most)) in limits(target, piece, segment).items():
-                value = float(np.clip(getattr(segment, name), low, high))
-                start = (
-                    None
-                    if name == "angle"
-                    else float(np.clip(getattr(prototype(target, piece), name), low, high))
-                )
+                value, usual = (float(np.clip(getattr(s, name), low, high)) for s in (segment, preferred))
+                start = None if name == "angle" else usual
                 variables.append(Variable(name, i, value, low, high, least, most, start))
         if target.pressure_range is None:
             low, high = max(LEAST_PRESSURE, 0.6 * guess.pressure), min(PRESSURE_LIMIT, 1.4 * guess.pressure)
@@ -132,7 +130,6 @@ class _Run:
         for i, n in enumerate(guess.counts):
             low, high = max(1.0, (1 - SPLIT_KEPT) * n), (1 + SPLIT_KEPT) * n + 1
             variables.append(Variable("chambers", i, n, low, high, low, high, n))
-        variables = tuple(v for v in variables if v.high > v.low)
         turns = np.eye(3)[:, : 3 if target.base_direction is None else 1 if target.base_width is None else 0]
         problem = Problem(
             target,
@@ -145,7 +142,7 @@ class _Run:
             _some_rotation(target),
             turns,
         )
-        return cls(problem, variables).turned_to_target()
+        return cls(problem, tuple(v for v in variables if v.high > v.low)).turned_to_target()
 
     def allows(self, counts):
         """Whether numbers of chambers lie in their ranges, rounded outwards."""
@@ -210,7 +207,7 @@ class _Run:
         start = next((x for x in starts if calls.attempt(x) is not None), None)
         if start is None:
             raise ConvergenceError(
-                f"the law has no equilibrium at {1e3 * problem.pressure:.1f} kPa: lower the pressure"
+                f"the law has no equilibrium at {KPA_PER_MPA * problem.pressure:.1f} kPa: lower the pressure"
             )
         options = {"x_scale": scale, "xtol": 1e-5, "ftol": 3e-3, "gtol": 1e-10, "max_nfev": 40}
         fit = least_squares(calls.residual, start, calls.jacobian, (low, high), **options)
@@ -237,8 +234,8 @@ class _Run:
         counts = " / ".join(f"{n:.3g}" for n in self.problem.counts)
         return (
             f"angles {_angles(self.problem.prototypes)} deg, chambers {counts},"
-            f" {1e3 * self.problem.pressure:.1f} kPa, objective {np.sqrt(self.cost):.3f} mm (root mean"
-            " square)"
+            f" {KPA_PER_MPA * self.problem.pressure:.1f} kPa,"
+            f" objective {np.sqrt(self.cost):.3f} mm (root mean square)"
         )
 
     def solution(self):
@@ -246,27 +243,18 @@ class _Run:
         segments = []
         for i, (segment, count) in enumerate(zip(self.problem.prototypes, self.problem.counts)):
             names = [v.name for v in self.variables if v.segment == i and v.name != "chambers"]
-            rounded = {name: round(getattr(segment, name), ROUNDING.get(name, 3)) for name in names}
-            segments.append(replace(segment, chambers=round(count), **rounded))
+            sizes = {name: round(getattr(segment, name), ROUNDING.get(name, 3)) for name in names}
+            segments.append(replace(segment, chambers=round(count), **sizes))
         pressure = round(self.problem.pressure, 6)
         rounded = replace(self.problem, prototypes=tuple(segments), pressure=pressure)
         residual = rounded.residual(Trial(rounded, (), np.zeros(self.problem.turns.shape[1])))
-        active = tuple(v.text for v in self.variables if v.bound is not None) + tuple(
-            about_to_touch(segments, pressure)
-        )
+        active = (*(v.text for v in self.variables if v.text), *about_to_touch(segments, pressure))
         pose = se3.make_pose(self.problem.rotation, self.problem.target.points[0])
-        return Found(
-            Manipulator(tuple(segments)),
-            pressure,
-            pose,
-            float(residual @ residual),
-            active,
-            self.grown,
-            self.evaluations,
-        )
+        body, cost = Manipulator(tuple(segments)), float(residual @ residual)
+        return Found(body, pressure, pose, cost, active, self.grown, self.evaluations)
 
 
-def about_to_touch(segments: Sequence, pressure: float) -> Iterator[str]:
+def about_to_touch(segments: Sequence[Segment], pressure: float) -> Iterator[str]:
     """Segments whose estimated clearance the design has used up, in words."""
     for i, segment in enumerate(segments, start=1):
         left = gap_left(segment, pressure)

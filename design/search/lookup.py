@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneunet.base.strains import RodStrains
-from pneunet.geometry.parameters import TWISTING as TWISTING_KIND
-from pneunet.geometry.parameters import Segment
+from pneunet.design.target.extraction import Extracted
+from pneunet.geometry.parameters import TWISTING, Segment
 from pneunet.reduced.rod.laws import SegmentLaw
 
 HEIGHT_WEIGHT = 0.1  # rad per mm away from the start height: decides only between equals
@@ -25,8 +25,8 @@ class Guess:
     in MPa."""
 
     pressure: float
-    segments: tuple
-    counts: tuple
+    segments: tuple[Segment, ...]
+    counts: tuple[float, ...]
     misfit: float
 
 
@@ -43,16 +43,16 @@ def count_for(segment: Segment, stretch: float, deformed_length: float) -> float
 
 
 def first_guesses(
-    pieces: Sequence,
+    pieces: Sequence[Extracted],
     prototypes: Sequence[Segment],
-    angles: list,
-    heights: list,
+    angles: Sequence[np.ndarray],
+    heights: Sequence[np.ndarray],
     pressures: np.ndarray,
     law: SegmentLaw,
-) -> list:
+) -> list[Guess]:
     """`Guess`es, best first, one for every pressure at which each piece has an entry.
 
-    pieces: `Extracted`; prototypes: a Segment for each with its start dimensions; angles (deg) and heights
+    prototypes: a Segment for each with its start dimensions; angles (deg) and heights
     (mm): the grid of each piece; pressures: increasing, MPa.
     """
     options = [
@@ -61,20 +61,18 @@ def first_guesses(
     ]
     guesses = []
     for j, pressure in enumerate(pressures):
-        best = [min(entries[j], key=lambda entry: entry[0], default=None) for entries in options]
-        if None not in best:
-            misfit = sum(entry[0] for entry in best)
-            guesses.append(
-                Guess(float(pressure), tuple(b[1] for b in best), tuple(b[2] for b in best), misfit)
-            )
+        if all(entries[j] for entries in options):
+            best = [min(entries[j], key=lambda entry: entry[0]) for entries in options]
+            misfits, segments, counts = zip(*best)
+            guesses.append(Guess(float(pressure), segments, counts, sum(misfits)))
     return sorted(guesses, key=lambda guess: guess.misfit)
 
 
 def _options(piece, prototype, angles, heights, pressures, law):
     """For every pressure the list of (misfit, segment, count) of one piece."""
     segments = [replace(prototype, angle=float(a), chamber_height=float(h)) for a in angles for h in heights]
-    found = responses(law.table(segments, pressures), prototype.kind == TWISTING_KIND)
-    entries = [[] for _ in pressures]
+    found = responses(law.table(segments, pressures), prototype.kind == TWISTING)
+    entries: list[list[tuple[float, Segment, float]]] = [[] for _ in pressures]
     asked = piece.length * np.array([piece.curvature, piece.twist])
     for segment, rows in zip(segments, np.moveaxis(found, 0, -1)):
         away = (HEIGHT_WEIGHT * (segment.chamber_height - prototype.chamber_height)) ** 2

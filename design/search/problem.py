@@ -13,6 +13,10 @@ import numpy as np
 from pneunet.base import se3
 from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.design.search.space import Variable
+from pneunet.design.target.extraction import Extracted
+from pneunet.design.target.target import Target
+from pneunet.geometry.parameters import Segment
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.centreline import Centreline, centreline
 from pneunet.reduced.rod.ends import free_pieces
@@ -34,8 +38,8 @@ class Trial:
     """What a vector of variables stands for: segments, real counts of chambers, pressure and base
     rotation."""
 
-    def __init__(self, problem, variables, x):
-        changes = [{} for _ in problem.prototypes]
+    def __init__(self, problem: "Problem", variables: Sequence[Variable], x: np.ndarray) -> None:
+        changes: list[dict] = [{} for _ in problem.prototypes]
         self.counts = np.array(problem.counts, float)
         self.pressure = problem.pressure
         for variable, value in zip(variables, x):
@@ -63,12 +67,12 @@ class Problem:
     when its direction is fixed, none when it is fixed altogether.
     """
 
-    target: object
-    pieces: tuple
-    law: object
+    target: Target
+    pieces: tuple[Extracted, ...]
+    law: SegmentLaw
     objective: str
-    prototypes: tuple
-    counts: tuple
+    prototypes: tuple[Segment, ...]
+    counts: tuple[float, ...]
     pressure: float
     rotation: np.ndarray
     turns: np.ndarray
@@ -111,7 +115,7 @@ class Problem:
         return np.array(misfits)
 
 
-def walls_overlap(segments: Sequence, pressure: float) -> np.ndarray:
+def walls_overlap(segments: Sequence[Segment], pressure: float) -> np.ndarray:
     """By how much (mm) facing walls of each segment are expected to pass through each other; 0 where a gap
     stays."""
     return np.array([max(0.0, -gap_left(s, pressure)) for s in segments])
@@ -121,7 +125,9 @@ class Calls:
     """Residual and its differences for least_squares, counted; where the law has no equilibrium no step is
     taken."""
 
-    def __init__(self, problem, variables, scale, high):
+    def __init__(
+        self, problem: Problem, variables: Sequence[Variable], scale: np.ndarray, high: np.ndarray
+    ) -> None:
         self.problem, self.variables, self.scale, self.high = problem, variables, scale, high
         self.preferred = [i for i, v in enumerate(variables) if v.start is not None]
         self.count, self.size = 0, 0
@@ -139,6 +145,7 @@ class Calls:
         return out
 
     def residual(self, x: np.ndarray) -> np.ndarray:
+        """The residual (m,); where there is none, numbers too large to be taken."""
         out = self.attempt(x)
         return np.full(self.size, self.problem.target.length) if out is None else out
 

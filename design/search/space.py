@@ -1,25 +1,25 @@
 """The design space: start dimensions, what varies in each kind of segment, ranges that grow to castable
 limits."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.target.extraction import Extracted
-from pneunet.design.target.target import BENDING, TWISTING, Target
-from pneunet.geometry.parameters import ONE_SIDED, Segment
-from pneunet.geometry.parameters import TWISTING as TWISTING_KIND
+from pneunet.design.target.target import BENDING, Target
+from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 
+Range = tuple[float, float]
 AT_BOUND = 1e-3  # of a variable's range
 #: start dimensions, mm, where they differ from Segment's own: castable and of the paper's magnitudes
-START = {
+START: dict[str, dict] = {
     ONE_SIDED: {},
-    TWISTING_KIND: {"chamber_height": 5.5, "cavity_floor": 0.5, "gap": 2.0},
+    TWISTING: {"chamber_height": 5.5, "cavity_floor": 0.5, "gap": 2.0},
 }
 #: start range and castable limits, mm and degrees, of what varies by default
-RANGES = {
+RANGES: dict[str, dict[str, tuple[Range, Range]]] = {
     ONE_SIDED: {
         "angle": ((45, 135), (30, 150)),
         "chamber_height": ((3, 5), (2, 8)),
@@ -27,13 +27,13 @@ RANGES = {
         "wall": ((1, 1.5), (0.8, 2)),
         "gap": ((1, 2), (1, 3)),  # half a gap of channel must fit into the end margin
     },
-    TWISTING_KIND: {
+    TWISTING: {
         "angle": ((45, 135), (30, 150)),
         "chamber_height": ((4, 6), (2, 8)),
         "gap": ((2, 3), (1, 3)),
     },
 }
-UNITS = {"pressure": (" kPa", 1e3), "angle": (" deg", 1.0), "chambers": ("", 1.0)}
+UNITS = {"pressure": (" kPa", KPA_PER_MPA), "angle": (" deg", 1.0), "chambers": ("", 1.0)}
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,9 @@ class Variable:
 
     @property
     def text(self) -> str:
-        """The bound that the value sits on, in words."""
+        """The bound that the value sits on, in words; "" on none."""
+        if self.bound is None:
+            return ""
         unit, factor = UNITS.get(self.name, (" mm", 1.0))
         side = "lower" if self.bound == self.low else "upper"
         shown = round(self.value) if self.name == "chambers" else factor * self.bound
@@ -88,19 +90,19 @@ class Variable:
 def prototype(target: Target, piece: Extracted) -> Segment:
     """The Segment with a piece's start dimensions: material and shared dimensions are the same for all
     pieces."""
-    kind = TWISTING_KIND if piece.kind == TWISTING else ONE_SIDED
+    kind = TWISTING if piece.kind == TWISTING else ONE_SIDED
     try:
         return Segment(kind, 90.0, 1, **(START[kind] | target.start), material=target.material)
     except InputError as error:
         raise InputError(f"[segment] (start dimensions of the {kind} segments): {error}") from None
 
 
-def limits(target: Target, piece: Extracted, segment: Segment) -> dict:
+def limits(target: Target, piece: Extracted, segment: Segment) -> dict[str, tuple[Range, Range]]:
     """{name: (start range, limits)} of what varies in one segment; the user's bounds are limits at once."""
     ranges = RANGES[segment.kind]
     if target.vary is not None:
         ranges = {"angle": ranges["angle"]} | {name: (bounds, bounds) for name, bounds in target.vary.items()}
-        if segment.kind == TWISTING_KIND:
+        if segment.kind == TWISTING:
             ranges.pop("base_thickness", None)
         _check_vary(target.vary, segment)
     if piece.kind == BENDING:
@@ -117,9 +119,7 @@ def _check_vary(vary, segment):
                 raise InputError(f"[vary]: {error}") from None
 
 
-def grid(limits: tuple | None, fixed: float, step: float) -> Sequence[float]:
-    """Values about `step` apart over a start range of `limits`; what does not vary has one value."""
-    if limits is None:
-        return [fixed]
-    low, high = limits[0]
-    return np.linspace(low, high, max(1, round((high - low) / step)) + 1) if high > low else [low]
+def grid(limits: tuple[Range, Range] | None, fixed: float, step: float) -> np.ndarray:
+    """Values (n,) about `step` apart over a start range of `limits`; what does not vary has one value."""
+    low, high = limits[0] if limits else (fixed, fixed)
+    return np.linspace(low, high, max(1, round((high - low) / step)) + 1) if high > low else np.array([low])

@@ -16,7 +16,9 @@ from pneunet.base import se3
 from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.base.strains import RodStrains
-from pneunet.design.target.target import BENDING, HELICAL, TWISTING, Target
+from pneunet.base.units import PER_MM_PER_M
+from pneunet.design.target.target import BENDING, HELICAL, Piece, Target
+from pneunet.geometry.parameters import TWISTING
 
 FIT_POINTS = 31
 
@@ -58,19 +60,20 @@ class Extracted:
 
     def table(self) -> dict:
         """By file key; the paper's and Frenet's numbers by their own names."""
-        out = {"kind": self.kind, "length_mm": self.length}
-        if self.kind == TWISTING:
-            out["tau_rad_per_mm"] = self.twist
-        else:
-            out["curvature_per_m"] = 1e3 * self.curvature
-        if self.kind == HELICAL:
-            out["torsion_rad_per_m"] = 1e3 * self.twist
-            out["cylinder_curvature_per_m"] = 1e3 * float(self.strains.helix_cylinder_curvature)
-            out["pitch_mm"] = float(self.strains.helix_pitch)
-        out["fit_rms_mm"] = self.fit_rms
-        if self.note:
-            out["note"] = self.note
-        return out
+        out = {"kind": self.kind, "length_mm": self.length} | rates(self.kind, self.strains)
+        return out | {"fit_rms_mm": self.fit_rms} | ({"note": self.note} if self.note else {})
+
+
+def rates(kind: str, strains: RodStrains) -> dict[str, float]:
+    """What a piece of a kind does per deformed length, by file key, from its RodStrains (3,)."""
+    if kind == TWISTING:
+        return {"tau_rad_per_mm": float(strains.twist_per_deformed_length)}
+    table = {"curvature_per_m": float(strains.frenet_curvature) / PER_MM_PER_M}
+    if kind == HELICAL:
+        table["torsion_rad_per_m"] = float(strains.frenet_torsion) / PER_MM_PER_M
+        table["cylinder_curvature_per_m"] = float(strains.helix_cylinder_curvature) / PER_MM_PER_M
+        table["pitch_mm"] = float(strains.helix_pitch)
+    return table
 
 
 def _screw(curvature, twist):
@@ -94,18 +97,18 @@ def fit_arc(points: np.ndarray, kind: str, curvature: float | None = None, twist
     given_curvature = 0.0 if kind == TWISTING else curvature
     given_twist = 0.0 if kind in (TWISTING, BENDING) else twist
 
-    def rates(x):
+    def rates_of(x):
         x = list(x / length)
         c = given_curvature if given_curvature is not None else x.pop(0)
         t = given_twist if given_twist is not None else x.pop(0)
         return c, t
 
     def misfit(x):
-        arc = _arc_points(s, *rates(x))
+        arc = _arc_points(s, *rates_of(x))
         return (se3.transform(best_rigid_fit(arc, wanted, weights), arc) - wanted).ravel()
 
     _, curvatures, torsions = curve.frenet(length / 3)
-    starts = [[]]
+    starts: list[list[float]] = [[]]
     if given_curvature is None:
         starts = [[length * np.median(curvatures)]]
     if given_twist is None:
@@ -117,9 +120,8 @@ def fit_arc(points: np.ndarray, kind: str, curvature: float | None = None, twist
     if best.size:
         fits = [least_squares(misfit, start, xtol=1e-10, ftol=1e-12) for start in starts]
         best = min(fits, key=lambda fit: fit.cost).x
-    c, t = rates(best)
-    if c < 0:  # a half turn about the tangent makes it the same arc with a positive curvature
-        c = -c
+    c, t = rates_of(best)
+    c = abs(c)  # a half turn about the tangent makes it the same arc with a positive curvature
     arc = _arc_points(s, c, t)
     pose = best_rigid_fit(arc, wanted, weights)
     rms = float(np.sqrt(np.mean(np.sum((se3.transform(pose, arc) - wanted) ** 2, axis=1))))
@@ -133,7 +135,7 @@ def turn_about_axis(before: np.ndarray, after: np.ndarray) -> float:
     return float(np.arctan2(R[2, 1] - R[1, 2], R[1, 1] + R[2, 2]))
 
 
-def extract(target: Target, pieces: Sequence) -> list[Extracted]:
+def extract(target: Target, pieces: Sequence[Piece]) -> list[Extracted]:
     """The list of `Extracted` for the pieces of a target; the user's givens are kept where there are any."""
     ends = np.concatenate([[0.0], np.cumsum([p.length for p in pieces])])
     own = target.curve.arc_lengths
@@ -162,7 +164,7 @@ def _kept(piece):
 
 def _runs(pieces):
     """Indices of neighbouring twisting pieces, as lists."""
-    runs = []
+    runs: list[list[int]] = []
     for i, piece in enumerate(pieces):
         if piece.kind == TWISTING:
             if runs and runs[-1][-1] == i - 1:
@@ -178,12 +180,11 @@ def _twist_of_run(target, pieces, arcs, run):
     first, last = run[0], run[-1]
     before = arcs[first - 1].end if first > 0 else target.base_rotation
     after = arcs[last + 1].start if last + 1 < len(pieces) else None
-    seen = before is not None and after is not None
+    shown = turn_about_axis(before, after) if before is not None and after is not None else None
     free = [i for i in run if pieces[i].twist is None]
     given = sum(pieces[i].twist * pieces[i].length for i in run if pieces[i].twist is not None)
     turn, note = 0.0, "the points do not show its twist: taken as 0"
-    if seen:
-        shown = turn_about_axis(before, after)
+    if shown is not None:
         turn = (shown - given + np.pi) % (2 * np.pi) - np.pi
         note = (
             f"twist from the turn of the bending plane, {np.degrees(shown):.1f} deg modulo 360: the smallest"
@@ -194,16 +195,16 @@ def _twist_of_run(target, pieces, arcs, run):
     free_length = sum(pieces[i].length for i in free)
     for i in run:
         piece = pieces[i]
-        visible = seen and len(run) == 1
+        visible = shown is not None and len(run) == 1
         if piece.twist is None:
             yield Extracted(TWISTING, piece.length, turn / free_length, 0.0, arcs[i].rms, visible, note)
         else:
             kept = "as given"
-            if visible:
+            if shown is None:
+                kept += "; the points do not show it"
+            elif visible:
                 kept += f"; the points show a turn of {np.degrees(shown):.1f} deg modulo 360"
                 kept += f", the given one is {np.degrees(given):.1f} deg"
-            elif not seen:
-                kept += "; the points do not show it"
             yield Extracted(TWISTING, piece.length, piece.twist, 0.0, arcs[i].rms, visible, kept)
 
 

@@ -10,14 +10,14 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_csv
-from pneunet.base.files.schemas import TARGET
+from pneunet.base.files.schemas import POINT
 from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.strains import helix_frenet
-from pneunet.base.units import MPA_PER_KPA
-from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, TWISTING, Piece, Target
-from pneunet.geometry.parameters import Segment
+from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
+from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Piece, Target
+from pneunet.geometry.parameters import TWISTING, Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
@@ -78,15 +78,15 @@ def _read_points(path):
     if all(_is_number(cell) for cell in header):
         if len(header) != 3:
             raise InputError(f"{path}: a CSV without a header has 3 columns x, y, z in mm, not {len(header)}")
-        header, rows, skipped = list(TARGET), [first, *rows], 0
+        header, rows, skipped = list(POINT), [first, *rows], 0
     else:
         skipped = 1
-        refuse_unknown(dict.fromkeys(header), [*TARGET, *FRAME_COLUMNS], f"{path} header")
+        refuse_unknown(dict.fromkeys(header), [*POINT, *FRAME_COLUMNS], f"{path} header")
     values = _numbers(path, header, rows, skipped)
-    missing = [c for c in TARGET if c not in values]
+    missing = [c for c in POINT if c not in values]
     if missing:
         raise InputError(f"{path}: column '{missing[0]}' is missing")
-    points = np.column_stack([values[c] for c in TARGET])
+    points = np.column_stack([values[c] for c in POINT])
     return points, _frames_of(values, path) if "t1x" in values or "t2x" in values else None
 
 
@@ -213,9 +213,9 @@ def _pressure_range(table, where):
         low, high = _range(table[key], key, where)
     else:
         return None
-    if not 0 < low <= high <= 1e3 * PRESSURE_LIMIT:
+    if not 0 < low <= high <= KPA_PER_MPA * PRESSURE_LIMIT:
         raise InputError(
-            f"{where}: {key} = {table[key]} must lie in 0..{1e3 * PRESSURE_LIMIT:g} kPa (above it the"
+            f"{where}: {key} = {table[key]} must lie in 0..{KPA_PER_MPA * PRESSURE_LIMIT:g} kPa (above it the"
             " chambers leak)"
         )
     return low * MPA_PER_KPA, high * MPA_PER_KPA
@@ -286,16 +286,7 @@ def _helix(given, where):
 def _base(table, where):
     """(direction, width) unit vectors or None."""
     refuse_unknown(table, ("direction", "width_direction"), where)
-    out = []
-    for key in ("direction", "width_direction"):
-        if key not in table:
-            out.append(None)
-            continue
-        vector = _array([table[key]], key, where, 2)[0]
-        if vector.shape != (3,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0:
-            raise InputError(f"{where}: '{key}' must be three numbers, not all 0")
-        out.append(vector / np.linalg.norm(vector))
-    direction, width = out
+    direction, width = (_unit_vector(table, key, where) for key in ("direction", "width_direction"))
     if width is None:
         return direction, None
     if direction is None:
@@ -304,6 +295,15 @@ def _base(table, where):
         raise InputError(f"{where}: 'width_direction' must be perpendicular to 'direction'")
     width = width - (width @ direction) * direction
     return direction, width / np.linalg.norm(width)
+
+
+def _unit_vector(table, key, where):
+    if key not in table:
+        return None
+    vector = _array([table[key]], key, where, 2)[0]
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0:
+        raise InputError(f"{where}: '{key}' must be three numbers, not all 0")
+    return vector / np.linalg.norm(vector)
 
 
 def _start(table, where):

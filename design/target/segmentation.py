@@ -11,7 +11,8 @@ import numpy as np
 
 from pneunet.base.curve import Curve
 from pneunet.design.target.extraction import FIT_POINTS, fit_arc
-from pneunet.design.target.target import BENDING, HELICAL, TWISTING, Piece
+from pneunet.design.target.target import BENDING, HELICAL, Piece
+from pneunet.geometry.parameters import TWISTING
 
 SHORTEST = 20.0  # mm; a shorter piece has no room for two chambers and its ends
 GRID = 18  # joints tried along the curve
@@ -29,7 +30,8 @@ def split(curve: Curve) -> tuple[Piece, ...]:
     length = curve.length
     shortest = min(SHORTEST, length)
     joints = np.linspace(0, length, min(GRID, max(2, int(length / shortest * 4))) + 1)
-    best = [(0.0, None, None)] + [(np.inf, None, None)] * (len(joints) - 1)
+    #: of every joint: the cost up to it, and the joint before it with the kind of the piece between
+    best = [(0.0, 0, "")] + [(np.inf, 0, "")] * (len(joints) - 1)
     for j in range(1, len(joints)):
         for i in range(j):
             if joints[j] - joints[i] < shortest - 1e-9 or not np.isfinite(best[i][0]):
@@ -37,7 +39,8 @@ def split(curve: Curve) -> tuple[Piece, ...]:
             kind, cost = _kind_and_cost(curve, joints[i], joints[j], length)
             if best[i][0] + cost < best[j][0]:
                 best[j] = (best[i][0] + cost, i, kind)
-    kinds, ends, j = [], [length], len(joints) - 1
+    kinds: list[str] = []
+    ends, j = [length], len(joints) - 1
     while j:
         _, j, kind = best[j]
         kinds.insert(0, kind)
@@ -82,5 +85,5 @@ def _refined(curve, kinds, ends, step, shortest, length):
                     here, ends[i] = ends[i], position
                     tried[position] = misfit(i)
                     ends[i] = here
-            ends[i] = min(tried, key=tried.get)
+            ends[i] = min(tried, key=lambda position: tried[position])
     return ends

@@ -8,9 +8,10 @@ import numpy as np
 
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
-from pneunet.base.materials.laws import PAPER_TWISTING, NeoHookean
+from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic
 
-TWISTING, BENDING, HELICAL = "twisting", "bending", "helical"
+#: kinds of pieces; straight ones are TWISTING, as the segments are that follow them
+BENDING, HELICAL = "bending", "helical"
 LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
 PRESSURE_LIMIT = 0.060  # MPa; beyond it silicone pneu-nets leak (Jiang et al. 2021, Sec. IV D)
 
@@ -29,7 +30,7 @@ class Piece:
     curvature: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Target:
     """points (n, 3) in mm from base to tip, and optionally
 
@@ -42,13 +43,13 @@ class Target:
     points: np.ndarray
     name: str = "target"
     frames: np.ndarray | None = None
-    pieces: tuple = ()
+    pieces: tuple[Piece, ...] = ()
     base_direction: np.ndarray | None = None
     base_width: np.ndarray | None = None
-    pressure_range: tuple | None = None
-    material: NeoHookean = PAPER_TWISTING
+    pressure_range: tuple[float, float] | None = None
+    material: Hyperelastic = PAPER_TWISTING
     start: dict = field(default_factory=dict)
-    vary: dict | None = None
+    vary: dict[str, tuple[float, float]] | None = None
     source: str = ""
 
     @classmethod
@@ -59,7 +60,7 @@ class Target:
 
         return read_target(path)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         points = np.asarray(self.points, float)
         object.__setattr__(self, "points", points)
         check_points(points)
@@ -67,6 +68,10 @@ class Target:
             object.__setattr__(self, "frames", _checked_frames(np.asarray(self.frames, float), points))
         if self.pieces:
             object.__setattr__(self, "pieces", _fitted_to(self.pieces, self.length))
+
+    def __repr__(self) -> str:
+        told = f"{len(self.points)} points{' with frames' * (self.frames is not None)}, {self.length:.1f} mm"
+        return f"<Target {self.name}: {told}{f', {len(self.pieces)} pieces' if self.pieces else ''}>"
 
     @property
     def length(self) -> float:
@@ -81,11 +86,10 @@ class Target:
     @property
     def base_rotation(self) -> np.ndarray | None:
         """Rotation (3, 3) of a base that is fixed altogether, else None."""
-        if self.base_width is None:
+        along, across = self.base_direction, self.base_width
+        if along is None or across is None:
             return None
-        return np.column_stack(
-            [self.base_direction, self.base_width, np.cross(self.base_direction, self.base_width)]
-        )
+        return np.column_stack([along, across, np.cross(along, across)])
 
 
 def check_points(points: np.ndarray) -> None:

@@ -8,7 +8,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.toml import as_table, from_table, number, read_toml, refuse_unknown, to_table
 from pneunet.base.materials.laws import material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
-from pneunet.base.units import MPA_PER_KPA
+from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.parameters import Segment
 from pneunet.hifi.contact.medium import ThirdMedium
@@ -32,7 +32,7 @@ class CellCase(Checked):
     """
 
     segment: Segment
-    pressure: float = quantity("kPa", MPA_PER_KPA, low=1e-3, high=2000)
+    pressure: float = quantity("kPa", MPA_PER_KPA, low=1e-3, high=LARGEST_PRESSURE_KPA)
     mesh_size: float = quantity("mm", 1.5, low=0.1, high=20)
     levels: int = quantity(None, 10, low=1, high=1000)
     held: dict = field(default_factory=dict)

@@ -16,7 +16,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.strains import RodStrains
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Centreline:
     """Section frames along a rod.
 
@@ -26,6 +26,10 @@ class Centreline:
 
     s: np.ndarray
     poses: np.ndarray
+
+    def __repr__(self) -> str:
+        tip = self.points[-1].round(2)
+        return f"<Centreline: {len(self.s)} frames, {self.length:.1f} mm, tip at {tip} mm>"
 
     @property
     def points(self) -> np.ndarray:
@@ -53,7 +57,7 @@ class Centreline:
     @property
     def length(self) -> float:
         """Deformed length, mm."""
-        return self.arc_length[-1]
+        return float(self.arc_length[-1])
 
     def at(self, s: ArrayLike) -> np.ndarray:
         """Section frames (n, 4, 4) at any undeformed arc lengths s (n,) in mm on the rod: exact, not

@@ -14,10 +14,8 @@ from numpy.typing import ArrayLike
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.strains import RodStrains
+from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.parameters import Segment
-
-#: MPa
-LARGEST_PRESSURE = 2.0
 
 
 @runtime_checkable
@@ -108,7 +106,8 @@ def checked_pressure(pressure: ArrayLike) -> np.ndarray:
     pressure = np.asarray(pressure, float)
     if not ((pressure >= 0) & (pressure < np.inf)).all():
         raise InputError("pressure_kPa: give finite values >= 0")
-    if pressure.max(initial=0) > LARGEST_PRESSURE:
-        told = f"pressure = {pressure.max():g} MPa is more than {LARGEST_PRESSURE:g}"
+    largest = LARGEST_PRESSURE_KPA * MPA_PER_KPA
+    if pressure.max(initial=0) > largest:
+        told = f"pressure = {pressure.max():g} MPa is more than {largest:g}"
         raise InputError(f"{told}: laws take pressures in MPa; is it in kPa?")
     return pressure

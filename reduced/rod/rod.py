@@ -51,7 +51,7 @@ class RodPiece:
             raise InputError(f"mass = {self.mass:g} tonne/mm: give a finite value >= 0")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rod:
     """Pieces from base to tip; base_pose (4, 4): the clamp's frame in space, mm; tip_centre: (y, z) in mm of
     the tip's frame where tip forces act."""
@@ -68,6 +68,10 @@ class Rod:
         R = self.base_pose[:3, :3]
         if self.base_pose.shape != (4, 4) or abs(R.T @ R - np.eye(3)).max() > 1e-6:
             raise InputError("base_pose: give a (4, 4) pose with a rotation matrix")
+
+    def __repr__(self) -> str:
+        highest = max(p.pressure for p in self.pieces) * KPA_PER_MPA
+        return f"<Rod: {len(self.pieces)} pieces, {self.lengths.sum():.1f} mm, up to {highest:.4g} kPa>"
 
     @classmethod
     def of(
@@ -157,7 +161,7 @@ class Rod:
         return RodState(Centreline(s, poses), force, moment, error, iterations, load_steps)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RodState:
     """An equilibrium. line: Centreline of the elements' ends, exact in between; force (n, 3) in N and moment
     (n, 3) in N mm of the n elements, in their section frames; error: estimate of how far the nodes are from
@@ -170,6 +174,9 @@ class RodState:
     error: float
     iterations: int
     load_steps: int
+
+    def __repr__(self) -> str:
+        return f"<RodState: tip at {self.tip[:3, 3].round(2)} mm, error {self.error:.2g} mm>"
 
     @property
     def tip(self) -> np.ndarray:

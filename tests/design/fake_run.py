@@ -6,7 +6,7 @@ import json
 import numpy as np
 
 from pneunet.base.files.atomic import write_csv
-from pneunet.base.files.schemas import CENTRELINE, CENTRELINES, SEGMENTS, STEPS, TARGET, WALLS
+from pneunet.base.files.schemas import CENTRELINE, CENTRELINES, POINT, SEGMENTS, STEPS, WALLS
 from pneunet.base.strains import RodStrains
 from pneunet.geometry.designfile import DesignFile, body_tables, write_design_file
 from pneunet.geometry.parameters import Manipulator, Segment
@@ -45,7 +45,7 @@ def make_run(
     write_design_file(directory / "design.toml", design)
     line = predict(manipulator, pressure, model, base_pose=POSE)
     wave = np.column_stack([np.zeros_like(line.s), np.zeros_like(line.s), 1.5 * (1 - np.cos(line.s / 20.0))])
-    write_csv(directory / "target.csv", TARGET, line.points + wave)
+    write_csv(directory / "target.csv", POINT, line.points + wave)
     write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
     record = {"command": "pneunet design target.csv", "revision": "abc", "inputs": {"law": "analytic"}}
     (directory / "run.json").write_text(json.dumps(record))

@@ -1,5 +1,6 @@
 """The front door: one import, names that load when asked for, units in arguments, the README's five lines."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 
 import pneunet as pn
+from pneunet.base.files.results import Results
 from pneunet.geometry.parameters import Segment
+from tests.design.toy_law import ToyLaw
 
 ROOT = Path(__file__).resolve().parents[2]
 FINGER = pn.Manipulator((Segment("one-sided", 90.0, 8),))
@@ -29,7 +32,7 @@ def curve(tmp_path):
 
 
 def test_the_readmes_five_lines(curve, monkeypatch, capsys):
-    """As they stand there, finite elements included: on the coarsest mesh, by a key of the saved design."""
+    """As they stand there, finite elements included: to a low pressure, on a coarse mesh."""
     monkeypatch.chdir(curve.parent)
     lines = fenced(ROOT / "README.md")
     assert "pn.inverse_design(target)" in lines and 'design.solve("out/mine", ranks=2)' in lines
@@ -46,14 +49,18 @@ def test_the_readmes_five_lines(curve, monkeypatch, capsys):
     assert again["steps"]["tip_x_mm"][-1] == pytest.approx(solved.tip[0])
     read = pn.read_design("out/mine")
     assert np.allclose(read.prediction.points, design.prediction.points, atol=1e-9)
+    assert read.active_bounds == design.active_bounds and read.widened_ranges == design.widened_ranges
+    record = read.save("out/again") and pn.read_run("out/again").record
+    assert all(record[key] == again.record[key] for key in ("inputs", "evaluations", "wall_seconds"))
 
 
 def test_inverse_design_writes_and_prints_nothing(curve, monkeypatch, capsys, tmp_path_factory):
     empty = tmp_path_factory.mktemp("empty")
     monkeypatch.chdir(empty)
-    design = pn.inverse_design(np.loadtxt(curve, delimiter=",", skiprows=1), law="analytic")
+    design = pn.inverse_design(np.loadtxt(curve, delimiter=",", skiprows=1), law=ToyLaw())
     assert not list(empty.iterdir()) and capsys.readouterr() == ("", "")
-    assert design.errors.rms < 1.5 and isinstance(design.doubts, tuple) and design.active_bounds is not None
+    assert design.errors.rms < 1.5 and design.doubts == () and isinstance(design.active_bounds, tuple)
+    assert re.fullmatch(r"<Design target: 2 segments, .* kPa; RMS .* mm \(.* %\); 0 doubts>", repr(design))
     assert "target" in design.plot().axes[0].get_legend_handles_labels()[1]
 
 
@@ -67,6 +74,10 @@ def test_every_name_is_there_and_has_a_docstring():
     for name in pn.__all__:
         assert getattr(pn, name).__doc__, name
     assert set(pn.__all__) <= set(dir(pn))
+    tree = ast.parse(Path(pn.__file__).read_text())
+    for_checkers = next(node for node in tree.body if isinstance(node, ast.If)).body
+    places = {node.names[0].name: node.module.removeprefix("pneunet.") for node in for_checkers}
+    assert places == pn._PLACES
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         pn.nonsense  # noqa: B018
 
@@ -83,16 +94,39 @@ def test_a_bare_number_is_no_pressure():
         predict(FINGER, 30, shipped_law())
 
 
+def test_results_show_themselves_in_a_line(curve, tmp_path):
+    target, rod = pn.Target.read(curve), pn.rod(FINGER, pressure_kPa=20)
+    design = pn.Design.of(FINGER, pressure_kPa=20, law="analytic")
+    results = (target, target.curve, design, design.prediction, rod, rod.equilibrium())
+    for shown in (*map(repr, results), repr(pn.read_run(design.save(tmp_path)))):
+        assert "\n" not in shown and len(shown) < 160 and "array" not in shown
+    assert repr(target).startswith("<Target curve: 67 points, ") and "up to 20 kPa" in repr(rod)
+
+
+def test_a_table_is_called_by_its_name_where_that_is_enough(tmp_path):
+    one, two, three = (np.zeros(n, [("x_mm", float)]) for n in (1, 2, 3))
+    run = Results(tmp_path, {}, {"a": one, "solve/a": two, "solve/b": two, "shape/b": three, "cell/c": three})
+    assert [len(run[name]) for name in ("a", "solve/a", "shape/b", "c")] == [1, 2, 3, 3]
+    with pytest.raises(pn.InputError, match="table 'b' stands there 2 times: tables are solve/b, shape/b"):
+        run["b"]
+    with pytest.raises(pn.InputError, match="table 'd' is not there: tables are a, solve/a"):
+        run["d"]
+
+
 def test_a_manipulator_made_by_hand_goes_the_same_way(tmp_path):
     design = pn.Design.of(FINGER, pressure_kPa=20, name="finger")
     one, two = design.predict([10, 20])
     assert np.allclose(two.points, design.prediction.points) and not np.allclose(one.points, two.points)
+    assert np.array_equal(design.predict(10).points, next(iter(design.predict(p for p in [10]))).points)
     assert design.errors is None and design.pressure_kPa == pytest.approx(20)
     assert pn.read_design(design.save(tmp_path / "a b")).manipulator == FINGER
 
 
 def test_file_keys_are_arguments():
     segment = pn.segment(kind="one-sided", angle_deg=60, chambers=5, material=pn.silicone("Ecoflex 00-30"))
+    stiff = pn.silicone("Dragon Skin 30")
+    layered = pn.segment(stiff, stiff, kind="one-sided", angle_deg=60, chambers=5, layer_thickness_mm=0.5)
+    assert layered.layer_material is stiff and layered.layer_thickness == 0.5
     assert segment.angle == 60 and segment.material.mu == pytest.approx(pn.silicone("Ecoflex 00-30").mu)
     assert pn.loads(gravity_m_per_s2=[0, 0, -9.81]).gravity == (0.0, 0.0, -9810.0)
     with pytest.raises(pn.InputError, match="unknown key 'angel_deg'.*did you mean 'angle_deg'"):
