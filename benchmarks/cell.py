@@ -29,7 +29,7 @@ def sweep(what, folder):
     from pneunet.hifi.cell.run import solve_cell
 
     states, started = [], time.process_time()
-    _, facts = solve_cell(what, Path(folder) / "cell.msh", states.append)
+    _, facts = solve_cell(what, Path(folder) / "cell.npz", states.append)
     return time.process_time() - started, facts["cells"], states
 
 
@@ -38,7 +38,7 @@ def stiffness_difference(folder, mesh_size=2.0):
     from pneunet.hifi.cell.file import CellCase
     from pneunet.hifi.cell.run import solve_cell
 
-    segment, path = case(mesh_size).segment, Path(folder) / "fd.msh"
+    segment, path = case(mesh_size).segment, Path(folder) / "fd.npz"
     free, _ = solve_cell(CellCase(segment, 0.02, mesh_size, 1, contact="none"), path)
     q = free.strains.vector
     worst = 0.0
@@ -69,7 +69,7 @@ def gauge_difference(folder, mesh_size=2.0, pressure=0.02):
     from pneunet.hifi.path.newton import NewtonOptions
     from pneunet.hifi.path.stepping import StepSize, run_steps
 
-    segment, path, other = case(mesh_size).segment, Path(folder) / "cell.msh", Path(folder) / "recut.msh"
+    segment, path, other = case(mesh_size).segment, Path(folder) / "cell.npz", Path(folder) / "recut.npz"
     mesh_cell(segment, mesh_size, path)
     recut(path, other, segment.pitch, 0.9)
 

@@ -35,7 +35,7 @@ def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, **case):
     from pneunet.hifi.cell.file import CellCase
     from pneunet.hifi.cell.run import solve_cell
 
-    path, states, touches = Path(folder) / f"{time.monotonic_ns()}.msh", [], []
+    path, states, touches = Path(folder) / f"{time.monotonic_ns()}.npz", [], []
     started = time.process_time()
     solve_cell(
         CellCase(body, pressure, size, levels, contact=contact, **case),
@@ -208,7 +208,7 @@ def force_check(reference):
     from pneunet.base.errors import ConvergenceError
 
     try:
-        rows = medium_forces(reference.body, reference.folder / "medium.msh")
+        rows = medium_forces(reference.body, reference.folder / "medium.npz")
     except ConvergenceError as error:
         return {}, {"force_check": str(error)}
     compared = []

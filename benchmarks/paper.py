@@ -43,7 +43,7 @@ def sweep(body, contact, size=SIZE):
     case = CellCase(body, PRESSURES[-1], size, len(PRESSURES), contact=contact)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            solve_cell(case, Path(folder) / "cell.msh", states.append)
+            solve_cell(case, Path(folder) / "cell.npz", states.append)
         except (ConvergenceError, InputError) as error:
             reason = str(error)
     for j, state in enumerate(states[1:]):

@@ -101,7 +101,7 @@ def against_finite_elements():
             states = []
             solve_cell(
                 CellCase(replace(body.segments[0], chambers=1), TOP, MESH_SIZE, 10),
-                Path(folder) / "cell.msh",
+                Path(folder) / "cell.npz",
                 states.append,
             )
             law = QuadraticLaw.of_states(states)
@@ -114,7 +114,7 @@ def against_finite_elements():
                 ("pushed", DeadLoads(tip_force=(0.0, 0.0, push)), SHARES[0] * TOP),
             ):
                 solve, marks, seen = (
-                    ManipulatorSolve(body, Path(folder) / "manipulator.msh", loads=loads),
+                    ManipulatorSolve(body, Path(folder) / "manipulator.npz", loads=loads),
                     [s * TOP for s in SHARES],
                     [],
                 )

@@ -42,8 +42,8 @@ def cell_step(folder):
     from pneunet.hifi.path.control import LoadControl
     from pneunet.hifi.path.equilibrium import EquilibriumPath
 
-    mesh_cell(segment(1), COST_MESH, folder / "cell.msh")
-    system = CellSystem(CellProblem(segment(1), folder / "cell.msh"))
+    mesh_cell(segment(1), COST_MESH, folder / "cell.npz")
+    system = CellSystem(CellProblem(segment(1), folder / "cell.npz"))
     seconds, facts = walk(system, EquilibriumPath(system, LoadControl()), COST_PRESSURE, COST_LEVELS)
     facts["unknowns"] = system.problem.unknowns
     system.destroy()
@@ -65,7 +65,7 @@ def finite(folder, chambers, mesh_size):
 
     body = Manipulator((segment(chambers),))
     mesh_manipulator(body, mesh_size, folder / str(chambers))
-    return ManipulatorSolve(body, folder / str(chambers) / "manipulator.msh")
+    return ManipulatorSolve(body, folder / str(chambers) / "manipulator.npz")
 
 
 def middle(folder):
@@ -103,7 +103,7 @@ def against_segments():
         cell_step(folder)  # compiles the forms
         costs = {"cell": cell_step(folder), **{n: segment_step(folder, n) for n in CHAMBERS}}
         states = []
-        solve_cell(CellCase(segment(1), STRAIN_PRESSURE, STRAIN_MESH, 5), folder / "fine.msh", states.append)
+        solve_cell(CellCase(segment(1), STRAIN_PRESSURE, STRAIN_MESH, 5), folder / "fine.npz", states.append)
         found, dofs = middle(folder)
     pitch, errors, rows = segment(1).pitch, [], []
     for pressure, (e, k) in found.items():

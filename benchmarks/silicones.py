@@ -30,7 +30,7 @@ def free_strains(segment):
     with tempfile.TemporaryDirectory() as folder:
         solve_cell(
             CellCase(segment, LEVELS[-1] * segment.material.mu, MESH_SIZE, len(LEVELS)),
-            Path(folder) / "cell.msh",
+            Path(folder) / "cell.npz",
             states.append,
         )
     scale, loaded = normal_pitch(segment), [s for s in states if s.pressure > 0]

@@ -42,7 +42,7 @@ def solved_cell(segment):
 
     states = []
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "cell.msh"
+        path = Path(folder) / "cell.npz"
         solve_cell(CellCase(segment, TOP_kPa * MPA_PER_KPA, MESH_SIZE, LEVELS), path, states.append)
         return cell_surface(CellProblem(segment, path), states[-1]), states
 

@@ -76,7 +76,7 @@ def cell():
 
     with tempfile.TemporaryDirectory() as folder:
         state, _ = solve_cell(
-            CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1), Path(folder) / "cell.msh"
+            CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1), Path(folder) / "cell.npz"
         )
     strains = state.strains.vector.tolist()
     return {"strains": strains, "volume_mm3": state.volume, "stiffness": state.stiffness.tolist()}

@@ -1,4 +1,4 @@
-"""The meshes of the speed benches, as each code wants them: gmsh's file for ours, plain arrays for the
+"""The meshes of the speed benches, as each code wants them: manipulator.npz for ours, mesh.npz for the
 others."""
 
 import json
@@ -18,7 +18,7 @@ def segment():
 
 
 def make(directory, mesh_size, manipulator=None):
-    """Folder with manipulator.msh, mesh.json and mesh.npz for this mesh size (mm); made once.
+    """Folder with manipulator.npz, mesh.json and mesh.npz for this mesh size (mm); made once.
 
     mesh.npz: points (n, 3) in mm, tets (m, 4), base, cavity and channel (k, 4) tets whose first three
     vertices are a facet of that surface, all of positive volume, and the rules with which ours integrates:
@@ -37,33 +37,20 @@ def make(directory, mesh_size, manipulator=None):
     mesh_manipulator(manipulator, mesh_size, directory)
     with atomic_path(directory / "mesh.npz") as temporary:
         with open(temporary, "wb") as file:
-            np.savez(file, **arrays(directory / "manipulator.msh"))
+            np.savez(file, **arrays(directory / "manipulator.npz"))
     return directory
 
 
 def arrays(path):
-    """What mesh.npz holds, of a gmsh file."""
-    import gmsh
-
+    """What mesh.npz holds, of a mesh of ours."""
     from pneunet.geometry import tags
+    from pneunet.geometry.meshfile import read_mesh
 
-    gmsh.initialize()
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(path))
-        tags, points, _ = gmsh.model.mesh.getNodes()
-        order = np.argsort(tags)
-        tets = np.searchsorted(tags[order], gmsh.model.mesh.getElementsByType(4)[1].reshape(-1, 4))
-        found = {"points": points.reshape(-1, 3)[order], "tets": tets}
-        for name, tag in (("base", tags.BASE), ("cavity", tags.CAVITY), ("channel", tags.CHANNEL)):
-            entities = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
-            facets = np.concatenate(
-                [gmsh.model.mesh.getElementsByType(2, e)[1].reshape(-1, 3) for e in entities]
-            )
-            found[name] = owners(tets, np.searchsorted(tags[order], facets))
-    finally:
-        gmsh.finalize()
-    assert len(np.unique(tets)) == len(tags)
+    mesh, _ = read_mesh(path)
+    found = {"points": mesh.points, "tets": mesh.tetrahedra}
+    for name, tag in (("base", tags.BASE), ("cavity", tags.CAVITY), ("channel", tags.CHANNEL)):
+        found[name] = owners(mesh.tetrahedra, mesh.tagged(tag))
+    assert len(np.unique(mesh.tetrahedra)) == len(mesh.points)
     return found | rules()
 
 

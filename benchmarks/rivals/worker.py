@@ -19,7 +19,7 @@ def make_body(code, task, folder):
     if code == "pneunet":
         from our_body import BestBody, OurBody
 
-        return (BestBody if task == "best" else OurBody)(folder / "manipulator.msh")
+        return (BestBody if task == "best" else OurBody)(folder / "manipulator.npz")
     mesh = dict(np.load(folder / "mesh.npz"))
     if code == "felupe":
         from felupe_body import FElupeBody

@@ -22,7 +22,7 @@ _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
 @contextmanager
 def session(name: str = "pneunet") -> Iterator[Any]:
     """A gmsh session with one empty model; quiet, and closed whatever happens."""
-    gmsh.initialize()
+    gmsh.initialize(readConfigFiles=False)  # no options from the working directory or home
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.add(name)

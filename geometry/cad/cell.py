@@ -10,9 +10,9 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import atomic_path
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
+from pneunet.geometry.cad.meshing import refuse_absurd, save, tetrahedral_mesh
 from pneunet.geometry.parameters import Segment
 from pneunet.geometry.tags import AIR, GAP
 
@@ -25,14 +25,16 @@ def mesh_cell(
     gaps: bool = False,
     edge_size: float | None = None,
 ) -> dict[str, float]:
-    """Write the cell's mesh to `path`; returns {"body_mm3", "air_mm3", "cells"}.
+    """Write the cell's mesh to `path`, an .npz, and beside it gmsh's .msh; returns {"body_mm3", "air_mm3",
+    "cells"}.
 
     x runs from -pitch/2 to +pitch/2; a chamber is centred at x = cut (mm). `gaps`: mesh the space between the
     chambers too. edge_size (mm): size at the body's edges, where stresses are singular; it grows from there
-    to mesh_size; None = one size everywhere. InputError when the faces on the two cuts do not match or the
-    mesh fails.
+    to mesh_size; None = one size everywhere. InputError when there would be too many elements, the faces on
+    the two cuts do not match or the mesh fails.
     """
     half = segment.pitch / 2
+    refuse_absurd(mesh_size, [(segment, segment.pitch, 1)])
     with cad.session("cell"):
         body, air = _build(segment, half, cut, gaps)
         gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
@@ -44,14 +46,13 @@ def mesh_cell(
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises plain Exception with its own text
             raise InputError(f"gmsh could not mesh this cell: {error}; try another mesh_size_mm") from None
+        mesh = tetrahedral_mesh()
         facts = {
             "body_mm3": sum(gmsh.model.occ.getMass(3, v) for v in body),
             "air_mm3": sum(gmsh.model.occ.getMass(3, v) for v in air),
-            "cells": len(gmsh.model.mesh.getElementsByType(4)[0]),
+            "cells": len(mesh.tetrahedra),
         }
-        with atomic_path(Path(path)) as temporary:
-            gmsh.option.setNumber("Mesh.Binary", 1)
-            gmsh.write(str(temporary))
+        save(Path(path), mesh, facts)
     return facts
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import dolfinx
 import dolfinx.fem.petsc
+import ffcx
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -15,7 +16,9 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
-from pneunet.base.errors import InputError
+from pneunet.geometry import meshfile
+from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.fem.form_cache import form_cache, locked_form_cache
 
 OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
 #: sums may be reordered and pow need not set errno, so that loops over quadrature points vectorise: residuals
@@ -29,62 +32,65 @@ _FLAGS = [
     "-fassociative-math",
     "-fno-signed-zeros",
 ]
-#: timeout in s: another run may be compiling the same form into the same cache just now
-COMPILER = {"cffi_extra_compile_args": _FLAGS, "timeout": 60}
 VERSION = dolfinx.__version__
 MeshTags = dolfinx.mesh.MeshTagsMetaClass if OLD else dolfinx.mesh.MeshTags
 Form = fem.FormMetaClass if OLD else fem.Form
 
 
+# options come from here alone, not from JSON files in the working directory or at home
+_LOADER, _FFCX = ("_load_parameters", ffcx.parameters) if OLD else ("_load_options", ffcx.options)
+setattr(_FFCX, _LOADER, lambda: ({}, {}))
+setattr(dolfinx.jit, _LOADER, lambda: ({"cache_dir": form_cache(), "cffi_extra_compile_args": _FLAGS}, {}))
+
+
 @contextmanager
-def quiet_compiler() -> Iterator[None]:
-    """Compiling logs every gcc line at level INFO, and ffcx has the root logger print that to standard
-    error."""
+def _compiler(comm: MPI.Comm) -> Iterator[None]:
+    """Where forms are compiled. It logs every gcc line at level INFO, and ffcx has the root logger print that
+    to standard error."""
     before = logging.root.manager.disable
-    logging.disable(logging.INFO)
-    try:
-        yield
-    finally:
-        logging.disable(before)
+    with locked_form_cache(comm):
+        logging.disable(logging.INFO)
+        try:
+            yield
+        finally:
+            logging.disable(before)
 
 
-@quiet_compiler()
 def mixed_space(mesh: Mesh, degree: int = 2) -> fem.FunctionSpace:
     """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure on tetrahedra."""
-    if OLD:
-        u = ufl.VectorElement("CG", mesh.ufl_cell(), degree)
-        p = ufl.FiniteElement("CG", mesh.ufl_cell(), degree - 1)
-        return fem.FunctionSpace(mesh, ufl.MixedElement([u, p]))
-    import basix.ufl
+    with _compiler(mesh.comm):
+        if OLD:
+            u = ufl.VectorElement("CG", mesh.ufl_cell(), degree)
+            p = ufl.FiniteElement("CG", mesh.ufl_cell(), degree - 1)
+            return fem.FunctionSpace(mesh, ufl.MixedElement([u, p]))
+        import basix.ufl
 
-    cell = mesh.basix_cell()
-    u = basix.ufl.element("Lagrange", cell, degree, shape=(mesh.geometry.dim,))
-    p = basix.ufl.element("Lagrange", cell, degree - 1)
-    return fem.functionspace(mesh, basix.ufl.mixed_element([u, p]))
+        cell = mesh.basix_cell()
+        u = basix.ufl.element("Lagrange", cell, degree, shape=(mesh.geometry.dim,))
+        p = basix.ufl.element("Lagrange", cell, degree - 1)
+        return fem.functionspace(mesh, basix.ufl.mixed_element([u, p]))
 
 
-@quiet_compiler()
 def cell_vectors(mesh: Mesh, size: int) -> fem.FunctionSpace:
     """Space of one vector of `size` numbers a cell: tested with it, a form with free components is assembled
     in one pass."""
-    if OLD:
-        return fem.VectorFunctionSpace(mesh, ("DG", 0), dim=size)
-    return fem.functionspace(mesh, ("DG", 0, (size,)))
+    with _compiler(mesh.comm):
+        if OLD:
+            return fem.VectorFunctionSpace(mesh, ("DG", 0), dim=size)
+        return fem.functionspace(mesh, ("DG", 0, (size,)))
 
 
-@quiet_compiler()
 def compile_form(form: ufl.Form) -> Form:
     """A compiled form with the project's compiler arguments."""
-    return fem.form(form, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER}))
+    with _compiler(form.ufl_domain().ufl_cargo().comm):
+        return fem.form(form)
 
 
-@quiet_compiler()
 def expression(mesh: Mesh, ufl_expression: Expr, points: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """Callable: local cells (n,) -> values (n, points, components) of a UFL expression at reference
     points."""
-    compiled = fem.Expression(
-        ufl_expression, points, **({"jit_params": COMPILER} if OLD else {"jit_options": COMPILER})
-    )
+    with _compiler(mesh.comm):
+        compiled = fem.Expression(ufl_expression, points)
 
     def evaluate(cells):
         values = compiled.eval(cells) if OLD else compiled.eval(mesh, cells)
@@ -102,28 +108,47 @@ def scatter_add(function: fem.Function) -> None:
     function.x.scatter_forward()
 
 
-def read_mesh(path: Path | str, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTags]:
-    """(mesh, cell tags, facet tags) of a gmsh file, read on rank 0 and distributed."""
-    # gmshio.read_from_msh of 0.5 fails by itself, and a failure on rank 0 alone would leave the others
-    # waiting
-    import gmsh
+class _Gmsh:
+    """What gmshio asks of a gmsh model, answered from a TetrahedralMesh: each tag a group with one part."""
 
-    error = None
-    if comm.rank == 0:
-        gmsh.initialize()
-        gmsh.option.setNumber("General.Terminal", 0)
-        try:
-            gmsh.open(str(path))
-        except Exception as problem:
-            error = f"{path}: gmsh cannot read this mesh ({problem})"
-    try:
-        error = comm.bcast(error, root=0)
-        if error:
-            raise InputError(error)
-        return gmshio.model_to_mesh(gmsh.model, comm, 0, gdim=3)[:3]
-    finally:
-        if comm.rank == 0:
-            gmsh.finalize()
+    def __init__(self, content: meshfile.TetrahedralMesh):
+        self.content, self.mesh = content, self
+        self.groups = {
+            3: (content.tetrahedra, content.tetrahedron_tags),
+            2: (content.facets, content.facet_tags),
+        }
+
+    def getPhysicalGroups(self):
+        return [(dim, tag) for dim in (2, 3) for tag in np.unique(self.groups[dim][1])]
+
+    def getPhysicalName(self, dim, tag):
+        return f"{dim} {tag}"
+
+    def getEntitiesForPhysicalGroup(self, dim, tag):
+        return [tag]
+
+    def getNodes(self):
+        return np.arange(1, len(self.content.points) + 1), self.content.points.ravel(), []
+
+    def getElements(self, dim, tag):
+        rows, tags = self.groups[dim]
+        rows = rows[tags == tag] + 1
+        return [{3: 4, 2: 2}[dim]], [np.zeros(len(rows), np.int64)], [rows.ravel()]
+
+    def getElementProperties(self, kind):
+        return {4: ("Tetrahedron 4", 3, 1, 4, [], 4), 2: ("Triangle 3", 2, 1, 3, [], 3)}[kind]
+
+
+def read_mesh(path: Path | str, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTags]:
+    """(mesh, cell tags, facet tags) of an .npz, read on rank 0 and distributed; InputError on all ranks."""
+    read: list[meshfile.TetrahedralMesh] = []
+    on_rank_0(comm, lambda: read.append(meshfile.read_mesh(path)[0]))
+    return model_to_mesh(_Gmsh(*read) if read else None, comm)
+
+
+def model_to_mesh(model: object, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTags]:
+    """(mesh, cell tags, facet tags) of what rank 0 has meshed in gmsh; collective."""
+    return gmshio.model_to_mesh(model, comm, 0, gdim=3)[:3]
 
 
 def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:

@@ -35,7 +35,6 @@ from pneunet.base.files.toml import as_table, from_table
 from pneunet.base.system.processes import Limits, environment_without_launcher, machine_memory_MB, run_limited
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.runs.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
-from pneunet.hifi.runs.jit_cache import own_cache
 
 log = logging.getLogger(__name__)
 
@@ -181,13 +180,10 @@ def _run_in(folder, case, limits):
     write_text(
         folder / "case.json", json.dumps({"function": case.function, "inputs": case.inputs}, default=float)
     )
-    with own_cache() as cache:
-        environment = (
-            {"OMP_NUM_THREADS": "1"} | environment_without_launcher() | {"XDG_CACHE_HOME": str(cache)}
-        )
-        program = "pneunet.hifi.runs.case_process"
-        command = [sys.executable, "-X", "faulthandler", "-m", program, str(folder.resolve())]
-        ended = run_limited(command, limits, folder / "log.txt", environment, folder)
+    environment = {"OMP_NUM_THREADS": "1"} | environment_without_launcher()
+    program = "pneunet.hifi.runs.case_process"
+    command = [sys.executable, "-X", "faulthandler", "-m", program, str(folder.resolve())]
+    ended = run_limited(command, limits, folder / "log.txt", environment, folder)
     try:
         answer = json.loads((folder / "answer.json").read_text())
     except FileNotFoundError:

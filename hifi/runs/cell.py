@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 def run_cell(path: str | Path, directory: str | Path) -> None:
-    """Solve CELL.toml; directory/cell gets cell.csv (a row a level), cell.msh, run.json and walls.png of the
+    """Solve CELL.toml; directory/cell gets cell.csv (a row a level), cell.npz, run.json and walls.png of the
     last state.
 
     InputError on bad input; ConvergenceError, with what was reached in cell.csv, when the path ends short.
@@ -55,7 +55,7 @@ def run_cell(path: str | Path, directory: str | Path) -> None:
 
     status, facts = "reached what was asked for", {}
     try:
-        _, facts = solve_cell(case, out / "cell.msh", keep, pass_limit_point, touch)
+        _, facts = solve_cell(case, out / "cell.npz", keep, pass_limit_point, touch)
     except ConvergenceError as error:
         status = str(error)
     write_record(
@@ -74,7 +74,7 @@ def run_cell(path: str | Path, directory: str | Path) -> None:
         raise ConvergenceError(
             f"cell: {status}; {len(rows)} levels are in {out}; try less pressure or control = 'volume'"
         )
-    drawn = draw_cell(CellProblem(case.segment, out / "cell.msh"), states[0], out / "walls.png")
+    drawn = draw_cell(CellProblem(case.segment, out / "cell.npz"), states[0], out / "walls.png")
     log.info(
         f"done: {len(rows)} states in {out / 'cell.csv'}{', the last one in walls.png' * drawn}; K in N, N"
         " mm, N mm2 per unit of (e, k)"

@@ -5,12 +5,14 @@ Faces are tagged alike: the planes x, y, z = 0, the inner and the outer surface 
 """
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from contextlib import nullcontext
 
+import gmsh
 import numpy as np
 from dolfinx.mesh import CellType, Mesh, create_box, locate_entities_boundary, meshtags
 from mpi4py import MPI
 
+from pneunet.geometry.cad.body import session
 from pneunet.hifi.fem import compat
 
 #: (mesh, cell tags, facet tags)
@@ -18,35 +20,32 @@ TaggedMesh = tuple[Mesh, compat.MeshTags, compat.MeshTags]
 INNER, PLANE_X, PLANE_Y, PLANE_Z, OUTER, END, END_Y, END_Z = range(1, 9)
 
 
-def round_body(folder: Path, name: str, size: float, solid: int = 1) -> TaggedMesh:
+def round_body(name: str, size: float, solid: int = 1) -> TaggedMesh:
     """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or
     axis; solid: tag of its cells."""
-    import gmsh
+    comm = MPI.COMM_WORLD
+    with session(name) if comm.rank == 0 else nullcontext() as model:
+        if model:
+            _mesh(model, *ROUND[name], size, solid)
+        return compat.model_to_mesh(model, comm)
 
-    comm, path = MPI.COMM_WORLD, folder / f"{name}.msh"
-    if comm.rank == 0:
-        gmsh.initialize()
-        gmsh.option.setNumber("General.Terminal", 0)
-        draw, classify, radius = ROUND[name]
-        volume = draw(gmsh.model.occ)
-        gmsh.model.occ.synchronize()
-        groups = {}
-        for _, face in gmsh.model.getBoundary([(3, volume)], oriented=False):
-            groups.setdefault(classify(gmsh.model.getBoundingBox(2, face)), []).append(face)
-        for tag, faces in groups.items():
-            gmsh.model.addPhysicalGroup(2, faces, tag)
-        gmsh.model.addPhysicalGroup(3, [volume], solid)
-        grading = gmsh.model.mesh.field.add("MathEval")
-        gmsh.model.mesh.field.setString(grading, "F", f"{size}*{radius}")
-        gmsh.model.mesh.field.setAsBackgroundMesh(grading)
-        for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints"):
-            gmsh.option.setNumber(f"Mesh.{option}", 0)
-        gmsh.model.mesh.generate(3)
-        gmsh.model.mesh.setOrder(2)
-        gmsh.write(str(path))
-        gmsh.finalize()
-    comm.barrier()
-    return compat.read_mesh(path, comm)
+
+def _mesh(model, draw, classify, radius, size, solid):
+    volume = draw(model.occ)
+    model.occ.synchronize()
+    groups = {}
+    for _, face in model.getBoundary([(3, volume)], oriented=False):
+        groups.setdefault(classify(model.getBoundingBox(2, face)), []).append(face)
+    for tag, faces in groups.items():
+        model.addPhysicalGroup(2, faces, tag)
+    model.addPhysicalGroup(3, [volume], solid)
+    grading = model.mesh.field.add("MathEval")
+    model.mesh.field.setString(grading, "F", f"{size}*{radius}")
+    model.mesh.field.setAsBackgroundMesh(grading)
+    for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints"):
+        gmsh.option.setNumber(f"Mesh.{option}", 0)
+    model.mesh.generate(3)
+    model.mesh.setOrder(2)
 
 
 def _octant(occ, solid, length=3.0):

@@ -47,7 +47,7 @@ def torsion(
 ) -> list[ExactComparison]:
     """Torque and axial force of the cylinder as a cell; the gauge is its whole mantle."""
     problem = CellProblem(
-        Solid(1.0, 2.0), bodies.round_body(folder, "cylinder", size, tags.BODY), (bodies.OUTER,), centre=0.5
+        Solid(1.0, 2.0), bodies.round_body("cylinder", size, tags.BODY), (bodies.OUTER,), centre=0.5
     )
     state = held_at(problem, np.ones(6, bool), np.array([stretch, 0, 0, twist, 0, 0]))
     torque, axial = closed_forms.torsion(stretch, twist)

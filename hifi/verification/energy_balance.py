@@ -19,7 +19,7 @@ def balance(intervals: int = 8) -> tuple[list[tuple[int, float]], int]:
     """([(intervals, work of the pressure / stored energy - 1), coarsest rule first], dofs) of the shipped
     two-segment body."""
     design = read_design_file(reference_case.DATA / "reference.toml")
-    solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
+    solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.npz")
     pressures = np.linspace(0.0, PRESSURE, intervals + 1)
     volume = {0.0: solve.problem.cavity_volume()}
     solve.run(

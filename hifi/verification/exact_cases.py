@@ -36,7 +36,7 @@ def sphere(
 
     Pressure control to 0.8, from there on volume control; radii are those of the cavity's volume.
     """
-    system = body_system(bodies.round_body(folder, "sphere", size), SYMMETRY, [Pressure((bodies.INNER,))])
+    system = body_system(bodies.round_body("sphere", size), SYMMETRY, [Pressure((bodies.INNER,))])
 
     def radius():
         return (6 * system.volume() / np.pi) ** (1 / 3)
@@ -72,7 +72,7 @@ class _Tube:
         self.stretch = 1.0
         end = Support(bodies.END, 0, lambda X, load: (self.stretch - 1) * X[:, 0])
         self.system = body_system(
-            bodies.round_body(folder, "tube", size), [*SYMMETRY, end], [Pressure((bodies.INNER,))]
+            bodies.round_body("tube", size), [*SYMMETRY, end], [Pressure((bodies.INNER,))]
         )
         self.told = f"h = {size:g} r", self.system.problem.dofs
 
@@ -137,7 +137,7 @@ def torsion(
         return np.stack([lam * X[:, 0], y, z], axis=1) - X
 
     supports = [Support(bodies.PLANE_X, None, motion), Support(bodies.END, None, motion)]
-    system = body_system(bodies.round_body(folder, "cylinder", size), supports, [])
+    system = body_system(bodies.round_body("cylinder", size), supports, [])
     problem = system.problem
     [(force, moment)] = follow(system, [1.0], lambda: problem.reaction(bodies.END), first=0.5)
     X, u = from_all_ranks(problem, lambda X: X[:, 0] > -1)

@@ -59,7 +59,7 @@ def pressed(
 ) -> tuple[ExactComparison, float, CellState]:
     """(ExactComparison of the axial force, torque in N mm, CellState)."""
     row, penalty = Row(), WallPenalty()
-    mesh, cells, facets = bodies.round_body(folder, "cylinder", size, tags.BODY)
+    mesh, cells, facets = bodies.round_body("cylinder", size, tags.BODY)
     ends = np.isin(facets.values, (bodies.PLANE_X, bodies.END))
     facets = meshtags(mesh, 2, facets.indices, np.where(ends, tags.OUTER, facets.values).astype(np.int32))
     problem = CellProblem(row, (mesh, cells, facets), (bodies.OUTER,), centre=0.5, contact=penalty)

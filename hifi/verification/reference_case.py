@@ -21,7 +21,7 @@ def numbers() -> dict[str, float]:
     design = read_design_file(DATA / "reference.toml")
     # two decades below what is compared
     options = NewtonOptions(relative_tolerance=1e-11)
-    solve = ManipulatorSolve(design.manipulator, DATA / "reference.msh", newton_options=options)
+    solve = ManipulatorSolve(design.manipulator, DATA / "reference.npz", newton_options=options)
     solve.run(design.pressure)
     measured = solve.measure()
     out = {"volume_mm3": measured.volume, "largest_stretch": measured.largest_stretch}

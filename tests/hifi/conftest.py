@@ -9,8 +9,8 @@ from pneunet.hifi.verification import reference_case
 
 @pytest.fixture
 def reference():
-    """A ManipulatorSolve of hifi/verification/data/reference.msh."""
+    """A ManipulatorSolve of hifi/verification/data/reference.npz."""
     design = read_design_file(reference_case.DATA / "reference.toml")
-    solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.msh")
+    solve = ManipulatorSolve(design.manipulator, reference_case.DATA / "reference.npz")
     yield solve
     solve.destroy()

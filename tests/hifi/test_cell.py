@@ -56,7 +56,7 @@ def one_sided():
 
 
 def test_free_state_has_the_segment_s_symmetry_and_no_force(one_sided, tmp_path):
-    cell = solved(one_sided, tmp_path / "cell.msh", 0.02)
+    cell = solved(one_sided, tmp_path / "cell.npz", 0.02)
     state = cell.measure()
     e, k = state.strains.e, state.strains.k
     size = np.linalg.norm(k)
@@ -68,7 +68,7 @@ def test_free_state_has_the_segment_s_symmetry_and_no_force(one_sided, tmp_path)
 
 
 def test_stiffness_is_symmetric_positive_and_the_slope_of_forces(one_sided, tmp_path):
-    path = tmp_path / "cell.msh"
+    path = tmp_path / "cell.npz"
     cell = solved(one_sided, path, 0.02)
     state = cell.measure()
     free = state.strains.vector
@@ -85,7 +85,7 @@ def test_stiffness_is_symmetric_positive_and_the_slope_of_forces(one_sided, tmp_
 
 
 def test_a_stiff_bottom_layer_keeps_its_length(one_sided, tmp_path):
-    path, z = tmp_path / "cell.msh", one_sided.core_bottom + 0.25
+    path, z = tmp_path / "cell.npz", one_sided.core_bottom + 0.25
     stretches = []
     for mu in (0.2068, 20.68):
         layered = replace(one_sided, layer_thickness=0.5, layer_material=NeoHookean(mu))
@@ -100,8 +100,8 @@ def test_a_stiff_bottom_layer_keeps_its_length(one_sided, tmp_path):
 def test_the_work_of_the_pressure_is_stored_in_the_body_and_its_bottom_layer(one_sided, tmp_path):
     """P V - int V dP by Simpson's rule, at equal steps of the pressure."""
     layered = replace(one_sided, layer_thickness=0.5, layer_material=NeoHookean(0.6))
-    mesh_cell(layered, 4.0, tmp_path / "cell.msh")
-    system, pressures = CellSystem(CellProblem(layered, tmp_path / "cell.msh")), np.linspace(0, 0.02, 9)
+    mesh_cell(layered, 4.0, tmp_path / "cell.npz")
+    system, pressures = CellSystem(CellProblem(layered, tmp_path / "cell.npz")), np.linspace(0, 0.02, 9)
     volume, rest = {0.0: system.volume()}, system.problem.stored_energy()
     marks = tuple(pressures[1:])
     follow(
@@ -117,7 +117,7 @@ def test_the_work_of_the_pressure_is_stored_in_the_body_and_its_bottom_layer(one
 
 def test_twisting_cell_only_twists(tmp_path):
     segment = CASES["twist_w12"](angle=60.0, chambers=1, material=NeoHookean(0.317))
-    cell = solved(segment, tmp_path / "cell.msh", 0.02)
+    cell = solved(segment, tmp_path / "cell.npz", 0.02)
     k = cell.measure().strains.k
     assert np.abs(k[1:]).max() < 0.01 * abs(k[0])
     cell.destroy()
@@ -132,7 +132,7 @@ def at_gauge(segment, path, **gauge):
 
 
 def test_the_place_of_the_cut_does_not_matter(one_sided, tmp_path):
-    path, other = tmp_path / "cell.msh", tmp_path / "recut.msh"
+    path, other = tmp_path / "cell.npz", tmp_path / "recut.npz"
     mesh_cell(one_sided, 3.0, path)
     recut(path, other, one_sided.pitch, 0.9)
     state, moved = at_gauge(one_sided, path), at_gauge(one_sided, other)
@@ -144,9 +144,9 @@ def test_the_place_of_the_cut_does_not_matter(one_sided, tmp_path):
 def test_what_no_section_frame_can_change(one_sided, tmp_path):
     """Another gauge is another frame, whose strains and stiffness differ; |k|, k.e and the screw's compliance
     are the body's own."""
-    mesh_cell(one_sided, 3.0, tmp_path / "cell.msh")
+    mesh_cell(one_sided, 3.0, tmp_path / "cell.npz")
     state, other = (
-        at_gauge(one_sided, tmp_path / "cell.msh", gauge=g) for g in ((tags.CHANNEL,), (tags.CAVITY,))
+        at_gauge(one_sided, tmp_path / "cell.npz", gauge=g) for g in ((tags.CHANNEL,), (tags.CAVITY,))
     )
     assert abs(other.strains.e[1] - state.strains.e[1]) > 0.01
     assert np.linalg.norm(other.strains.k) == pytest.approx(np.linalg.norm(state.strains.k), rel=1e-7)
@@ -157,7 +157,7 @@ def test_what_no_section_frame_can_change(one_sided, tmp_path):
 def test_prescribed_curvature_leaves_the_other_strains_free(one_sided, tmp_path):
     """Holding k2 alone: its moment is what it takes, all other forces vanish; at the free value that moment
     does too."""
-    path = tmp_path / "cell.msh"
+    path = tmp_path / "cell.npz"
     free, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1), path)
     change = 0.002
     bent, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1, {4: free.strains.k[1] + change}), path)
@@ -174,7 +174,7 @@ def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
     segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.208))
     states, limits = [], []
     case = CellCase(segment, 0.05, 4.0, 8, control="volume", volume_factor=8.0)
-    solve_cell(case, tmp_path / "cell.msh", states.append, limits.append)
+    solve_cell(case, tmp_path / "cell.npz", states.append, limits.append)
     pressure, unstable = (np.array([getattr(s, name) for s in states]) for name in ("pressure", "unstable"))
     top = int(pressure.argmax())
     assert 0 < top < len(states) - 1

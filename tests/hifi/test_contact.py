@@ -33,7 +33,7 @@ def run(segment, folder, contact, levels, **case):
     """(states, pressures of first touch) up to 10 kPa."""
     states, touches = [], []
     case = CellCase(segment, PRESSURE, SIZE, levels, contact=contact, **case)
-    solve_cell(case, folder / "cell.msh", states.append, on_touch=touches.append)
+    solve_cell(case, folder / "cell.npz", states.append, on_touch=touches.append)
     return states, touches
 
 
@@ -89,8 +89,8 @@ def follow(system, target, first):
 
 
 def test_in_contact_stiffness_is_the_slope_of_forces_at_prescribed_strains(tall, tmp_path):
-    mesh_cell(tall, SIZE, tmp_path / "cell.msh")
-    problem = CellProblem(tall, tmp_path / "cell.msh", contact=WallPenalty())
+    mesh_cell(tall, SIZE, tmp_path / "cell.npz")
+    problem = CellProblem(tall, tmp_path / "cell.npz", contact=WallPenalty())
     free = CellSystem(problem)
     follow(free, PRESSURE, 0.004)
     state, rest = free.measure(), free.state.copy()
@@ -141,8 +141,8 @@ def test_the_third_medium_finds_the_same_contact(touching, tall, tmp_path):
 
 
 def test_both_walls_of_a_gap_are_whole_and_a_gap_apart(tall, tmp_path):
-    mesh_cell(tall, SIZE, tmp_path / "cell.msh", cut=1.3, gaps=True)
-    walls = CellWalls(CellProblem(tall, tmp_path / "cell.msh"))
+    mesh_cell(tall, SIZE, tmp_path / "cell.npz", cut=1.3, gaps=True)
+    walls = CellWalls(CellProblem(tall, tmp_path / "cell.npz"))
     area = tall.width / tall.sin * (tall.chamber_top - tall.core_top)
     for gap in walls.gaps:
         for wall in gap:
@@ -155,8 +155,8 @@ def test_both_walls_of_a_gap_are_whole_and_a_gap_apart(tall, tmp_path):
 
 def test_a_straight_medium_seen_from_a_twisting_frame_is_at_rest(tall, tmp_path):
     """The gradient of F along X1 contains the screw's rotation: without it a body at rest would push."""
-    mesh_cell(tall, SIZE, tmp_path / "cell.msh", gaps=True)
-    problem = CellProblem(tall, tmp_path / "cell.msh", medium=ThirdMedium())
+    mesh_cell(tall, SIZE, tmp_path / "cell.npz", gaps=True)
+    problem = CellProblem(tall, tmp_path / "cell.npz", medium=ThirdMedium())
     twist, X = 0.05, problem.nodes
     problem.strains.value[:] = [1, 0, 0, twist, 0, 0]
     twisted = np.abs(problem.medium_forces()).max()

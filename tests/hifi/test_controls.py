@@ -33,7 +33,7 @@ def test_a_limit_point_is_the_top_of_the_parabola():
 
 @pytest.fixture
 def sphere(shared_directory):
-    mesh = bodies.round_body(shared_directory, "sphere", 0.25)
+    mesh = bodies.round_body("sphere", 0.25)
     system = body_system(mesh, SYMMETRY, [Pressure((bodies.INNER,))])
     yield system
     system.destroy()
@@ -59,7 +59,7 @@ def test_arc_length_follows_the_sphere_through_its_limit_point(sphere):
 
 def test_several_pressures_rise_together(shared_directory):
     """One path, two pressures at a ratio: only their difference deforms an incompressible sphere."""
-    mesh = bodies.round_body(shared_directory, "sphere", 0.25)
+    mesh = bodies.round_body("sphere", 0.25)
     inner, outer = Pressure((bodies.INNER,)), Pressure((bodies.OUTER,))
     problem = BodyProblem(*mesh, NeoHookean(1.0), SYMMETRY, [inner, outer])
 

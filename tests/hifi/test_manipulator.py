@@ -17,7 +17,7 @@ def meshed(manipulator, directory, size=3.0):
     if comm.rank == 0:
         mesh_manipulator(manipulator, size, directory)
     comm.barrier()
-    return directory / "manipulator.msh"
+    return directory / "manipulator.npz"
 
 
 def set_positions(problem, positions):

@@ -37,8 +37,8 @@ def numbers(state):
 @pytest.mark.parametrize("name, pressure", [("one_sided_w10", 0.02), ("twist_w12", 0.02)])
 def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_path):
     segment = CASES[name](angle=60.0, chambers=1, material=NeoHookean(0.2))
-    mesh_cell(segment, 6.0, tmp_path / "cell.msh")
-    problem = CellProblem(segment, tmp_path / "cell.msh", contact=WallPenalty())
+    mesh_cell(segment, 6.0, tmp_path / "cell.npz")
+    problem = CellProblem(segment, tmp_path / "cell.npz", contact=WallPenalty())
     home = problem.mesh.geometry.x.copy()
     system, state = solved(problem, pressure)
     strains, stiffness = ShapeSlopes(problem).of(system)

@@ -48,7 +48,7 @@ def finger(shared_directory):
     if MPI.COMM_WORLD.rank == 0:
         mesh_manipulator(manipulator, 3.5, shared_directory)
     MPI.COMM_WORLD.barrier()
-    return manipulator, shared_directory / "manipulator.msh"
+    return manipulator, shared_directory / "manipulator.npz"
 
 
 def test_stiffness_of_an_inflated_body_is_the_slope_under_real_tip_loads(finger):

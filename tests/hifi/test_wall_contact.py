@@ -176,8 +176,8 @@ def test_bend_and_slope_make_the_tangent_away_from_blends():
 def pushed(tmp_path):
     """A coarse cell whose walls are moved into each other, unevenly, at strains far from rest."""
     segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.317))
-    mesh_cell(segment, 4.0, tmp_path / "cell.msh")
-    problem = CellProblem(segment, tmp_path / "cell.msh", contact=WallPenalty())
+    mesh_cell(segment, 4.0, tmp_path / "cell.npz")
+    problem = CellProblem(segment, tmp_path / "cell.npz", contact=WallPenalty())
     system = CellSystem(problem)
     x = system.state.copy()
     x[-6:] = [0.97, 0.01, -0.015, 0.012, 0.003, -0.002]

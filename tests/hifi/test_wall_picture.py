@@ -20,8 +20,8 @@ def test_walls_are_coloured_by_their_distance(tmp_path):
     from PIL import Image
 
     segment = Segment("one-sided", 90.0, 1)
-    mesh_cell(segment, 3.0, tmp_path / "cell.msh")
-    problem = CellProblem(segment, tmp_path / "cell.msh")
+    mesh_cell(segment, 3.0, tmp_path / "cell.npz")
+    problem = CellProblem(segment, tmp_path / "cell.npz")
     system = CellSystem(problem)
     distances = node_distances(CellWalls(problem), system.measure().array)
     on_wall = np.isfinite(distances)

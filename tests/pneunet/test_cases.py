@@ -14,7 +14,6 @@ import pytest
 
 from pneunet.hifi.runs.campaign.file import read_campaign
 from pneunet.hifi.runs.case_process import FUNCTIONS
-from pneunet.hifi.runs.jit_cache import own_cache
 from pneunet.hifi.runs.study.file import read_study
 from tests.toy_cases import ENDINGS
 
@@ -110,21 +109,6 @@ def test_two_runs_do_not_work_in_one_folder(tmp_path):
         process.kill()
         process.wait()
     assert "another run is at work in it" in refused.stderr
-
-
-def test_a_cache_serves_one_at_a_time_and_forgets_half_a_module(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with own_cache() as first, own_cache() as second:
-        assert first != second
-        (first / "fenics").mkdir()
-        for name in ("libffcx_forms_whole.c", "libffcx_forms_whole.c.cached", "libffcx_forms_half.c"):
-            (first / "fenics" / name).touch()
-    with own_cache() as again:
-        assert again == first
-        assert sorted(p.name for p in (first / "fenics").iterdir()) == [
-            "libffcx_forms_whole.c",
-            "libffcx_forms_whole.c.cached",
-        ]
 
 
 #: what the study's silicone was when its cases were first named

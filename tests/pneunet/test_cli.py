@@ -137,7 +137,12 @@ def test_mesh_stands_beside_the_design(folder):
     again = json.loads((folder / "a mesh" / "mesh" / "mesh.json").read_text())
     assert facts.pop("seconds") and again.pop("seconds") and facts == again
     assert f"cavity {facts['cavity_mm3']:.1f} mm3" in told and "cavity closed" in told
-    assert {p.name for p in out.iterdir()} == {"manipulator.msh", "manipulator.step", "mesh.json"}
+    assert {p.name for p in out.iterdir()} == {
+        "manipulator.npz",
+        "manipulator.msh",
+        "manipulator.step",
+        "mesh.json",
+    }
 
 
 def test_tables_of_a_solve_agree_with_each_other(folder):

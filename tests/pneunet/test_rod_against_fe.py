@@ -27,11 +27,11 @@ def finger(tmp_path_factory):
     states = []
     solve_cell(
         CellCase(replace(body.segments[0], chambers=1), PRESSURE, MESH_SIZE, 1),
-        folder / "cell.msh",
+        folder / "cell.npz",
         states.append,
     )
     mesh_manipulator(body, MESH_SIZE, folder)
-    return body, QuadraticLaw.of_states(states), folder / "manipulator.msh"
+    return body, QuadraticLaw.of_states(states), folder / "manipulator.npz"
 
 
 @pytest.mark.parametrize(

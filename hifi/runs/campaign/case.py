@@ -57,12 +57,13 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     segment = segment_from_table(
         inputs["segment"], "segment", material_from_table(inputs["material"], "material")
     )
-    path = directory / "cell.msh"
+    path = directory / "cell.npz"
     mesh = mesh_cell(
         segment, path=path, **{key.removesuffix("_mm"): value for key, value in inputs["mesh"].items()}
     )
     sampler = Sampler(CellProblem(segment, path, contact=WallPenalty()), directory, inputs["slopes"])
-    path.unlink()
+    for written in (path, path.with_suffix(".msh")):
+        written.unlink()
     mesh["unknowns"] = sampler.problem.unknowns
     top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
     levels = top * np.arange(inputs["levels"] + 1) / inputs["levels"]

@@ -14,6 +14,7 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import output_directory, room_in
 from pneunet.geometry.designfile import DesignFile, body_tables
 from pneunet.geometry.loading import Extras
+from pneunet.geometry.meshfile import MESH, read_mesh
 from pneunet.hifi.body import tip
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.contact.penalty import WallPenalty
@@ -59,7 +60,7 @@ def solve_design(
     everything accepted on disk) when the end asked for cannot be reached.
     """
     started, directory = time.perf_counter(), Path(directory)
-    mesh_path, out = directory / "mesh" / "manipulator.msh", directory / "solve"
+    mesh_path, out = directory / "mesh" / MESH, directory / "solve"
     goal, mesh_size = Goal.of(design, pressure), mesh_size or design.mesh_size
     identity = {
         "body": body_tables(design.manipulator),
@@ -196,9 +197,19 @@ def _mesh(design, folder, mesh_size):
     """Facts of the design's mesh in `folder`, which is made where there is none."""
     from pneunet.geometry.cad.mesh import mesh_manipulator, segment_tables
 
-    if (folder / "mesh.json").exists() and (folder / "manipulator.msh").exists():
-        facts = json.loads((folder / "mesh.json").read_text())
-        wanted = {"mesh_size_mm": mesh_size, "segments": segment_tables(design.manipulator)}
-        if all(facts.get(name) == value for name, value in wanted.items()):
+    wanted = {"mesh_size_mm": mesh_size, "segments": segment_tables(design.manipulator)}
+    if (folder / MESH).exists():
+        _, facts = read_mesh(folder / MESH)
+        if wanted == {name: facts.get(name) for name in wanted} and facts == _facts_for_people(folder):
             return facts
+    if folder.is_dir() and any(folder.glob("m*")):
+        log.info(f"{folder}: no {MESH} of this body and mesh size with its mesh.json: meshed anew")
     return mesh_manipulator(design.manipulator, mesh_size, folder)
+
+
+def _facts_for_people(folder):
+    """What mesh.json says; None where it says nothing."""
+    try:
+        return json.loads((folder / "mesh.json").read_text())
+    except (OSError, ValueError):
+        return None

@@ -49,7 +49,7 @@ def solve_cell_case(inputs: dict[str, Any], directory: Path) -> dict[str, Any]:
         )
         _write(directory, rows)
 
-    return {"mesh": solve_cell(case, directory / "cell.msh", keep, on_touch=touched.append)[1]}
+    return {"mesh": solve_cell(case, directory / "cell.npz", keep, on_touch=touched.append)[1]}
 
 
 def solve_design_case(inputs: dict[str, Any], directory: Path) -> dict[str, Any]:
