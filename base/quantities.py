@@ -13,6 +13,9 @@ from typing import Any
 from pneunet.base.errors import InputError
 from pneunet.base.units import TO_INTERNAL
 
+#: no quantity in any unit is larger, and powers of smaller ones do not overflow
+LARGEST_NUMBER = 1e30
+
 
 @dataclasses.dataclass(frozen=True)
 class Allowed:

@@ -17,9 +17,16 @@ from typing import Any
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.archive import read_archive, write_archive
+from pneunet.base.files.archive import Member, read_archive, write_archive
 
 SCHEMA = "pneunet-cells-2"
+FIX = "make it again with pneunet campaign"
+#: keys of `about` that are read again, and their types
+KEYS = {
+    **dict.fromkeys(("kinds", "meshes", "shape", "statuses", "revisions"), list),
+    **dict.fromkeys(("directions", "reasons", "campaign", "ranges"), dict),
+    "largest_symmetry_defect": float,
+}
 #: row-wise upper triangle of a symmetric 6 x 6 matrix
 UPPER = np.triu_indices(6)
 #: directions that a kind may have at most; rows beyond its own are nan
@@ -32,9 +39,14 @@ SLOPE_BITS = 12
 FORBIDDEN = {"one-sided": [2, 5], "twisting": [1, 2, 4, 5]}
 
 
-def column(of: str, shape: tuple[int, ...], kind: str, note: str) -> Any:
-    """One array of the data set: rows are cases or states; further shape; numpy type on disk."""
-    return field(metadata={"of": of, "shape": shape, "type": kind, "note": note})
+def column(
+    of: str, shape: tuple[int, ...], kind: str, note: str, gaps: bool = False, index_of: str = ""
+) -> Any:
+    """One array of the data set: rows are cases or states; further shape; numpy type on disk; whether nan may
+    stand in it; what it is an index into: a list of `about`, or "cases"."""
+    return field(
+        metadata={"of": of, "shape": shape, "type": kind, "note": note, "gaps": gaps, "index_of": index_of}
+    )
 
 
 @dataclass(frozen=True)
@@ -44,29 +56,29 @@ class CellData:
 
     about: dict
     # ---- cases
-    kind: np.ndarray = column("cases", (), "i1", "index into about['kinds']")
+    kind: np.ndarray = column("cases", (), "i1", "index into about['kinds']", index_of="kinds")
     design: np.ndarray = column(
         "cases", (), "i4", "number in the sample of its kind, from 0; edge designs from 100000"
     )
     held_out: np.ndarray = column("cases", (), "?", "for judging only")
-    mesh: np.ndarray = column("cases", (), "i1", "index into about['meshes']")
+    mesh: np.ndarray = column("cases", (), "i1", "index into about['meshes']", index_of="meshes")
     shape: np.ndarray = column(
         "cases", (13,), "f4", "about['shape']: angle in degrees, lengths in normal pitches"
     )
     normal_pitch_mm: np.ndarray = column("cases", (), "f4", "as sampled; everything else is divided by it")
-    status: np.ndarray = column("cases", (), "i1", "index into about['statuses']")
+    status: np.ndarray = column("cases", (), "i1", "index into about['statuses']", index_of="statuses")
     limit_pressure: np.ndarray = column(
-        "cases", (), "f4", "P/mu of the limit load or of the path's end; nan: not met"
+        "cases", (), "f4", "P/mu of the limit load or of the path's end; nan: not met", gaps=True
     )
     first_touch: np.ndarray = column(
-        "cases", (), "f4", "P/mu at which walls touch; nan: not met or not looked for"
+        "cases", (), "f4", "P/mu at which walls touch; nan: not met or not looked for", gaps=True
     )
     cells: np.ndarray = column("cases", (), "i4", "tetrahedra")
     unknowns: np.ndarray = column("cases", (), "i4", "of the cell")
     seconds: np.ndarray = column("cases", (), "f4", "of CPU that the case took")
     missing: np.ndarray = column("cases", (), "i1", "prescribed states that were not reached")
     # ---- states
-    case: np.ndarray = column("states", (), "i4", "row of its case")
+    case: np.ndarray = column("states", (), "i4", "row of its case", index_of="cases")
     prescribed: np.ndarray = column("states", (), "?", "at prescribed strains; else free")
     pressure: np.ndarray = column("states", (), "f4", "P/mu")
     strains: np.ndarray = column("states", (6,), "f4", "e1 e2 e3, and k1 k2 k3 times l")
@@ -78,14 +90,14 @@ class CellData:
     largest_stretch: np.ndarray = column("states", (), "f4", "largest principal stretch in the solid")
     residual: np.ndarray = column("states", (), "f4", "norm over mu pitch^2")
     wall_distance: np.ndarray = column(
-        "states", (), "f4", "smallest of neighbouring chambers over l; nan: not measured"
+        "states", (), "f4", "smallest of neighbouring chambers over l; nan: not measured", gaps=True
     )
     contact: np.ndarray = column("states", (), "?", "computed with contact")
     strain_slopes: np.ndarray = column(
-        "states", (DIRECTIONS, 6), "f4", "of free strains along the directions; nan: not computed"
+        "states", (DIRECTIONS, 6), "f4", "of free strains along the directions; nan: not computed", gaps=True
     )
     stiffness_slopes: np.ndarray = column(
-        "states", (DIRECTIONS, 21), "f4", "of the stiffness of free states, likewise"
+        "states", (DIRECTIONS, 21), "f4", "of the stiffness of free states, likewise", gaps=True
     )
 
     def __post_init__(self):
@@ -181,5 +193,36 @@ def _rounded(values, bits):
 
 def read_dataset(path: str | Path) -> CellData:
     """The CellData in a file; InputError when it is none or of another version."""
-    with read_archive(path, SCHEMA, "a data set of cells", "pneunet campaign") as (about, stored):
-        return CellData(about, **{f.name: stored[f.name] for f in columns()})
+    about, arrays = read_archive(path, SCHEMA, "a data set of cells", FIX, KEYS, _members)
+    return CellData(about, **arrays)
+
+
+def _members(about, _):
+    """What the file holds: every column of CellData."""
+    _require_lists(about)
+    members = {}
+    for f in columns():
+        kind = {"i": "iu", "f": "f", "?": "b"}[f.metadata["type"][0]]
+        of, index_of = f.metadata["of"], f.metadata["index_of"]
+        bounds = (0, len(about[index_of]) if index_of in about else index_of) if index_of else ()
+        members[f.name] = Member(kind, (of, *f.metadata["shape"]), *bounds, gaps=f.metadata["gaps"])
+    return members
+
+
+def _require_lists(about):
+    """InputError for what stands in `about` under the right keys and is no such thing."""
+    words = [word for key in ("shape", "statuses", "revisions") for word in about[key]]
+    wrong = [kind for kind in about["kinds"] if kind not in FORBIDDEN]
+    wrong += [mesh for mesh in about["meshes"] if not isinstance(mesh, dict) or "name" not in mesh]
+    wrong += [word for word in words if not isinstance(word, str)]
+    wrong += [kind for kind in about["kinds"] if not _is_matrix(about["directions"].get(kind, []), about)]
+    wrong += [] if isinstance(about["campaign"].get("designs", 0), int) else ["designs"]
+    if wrong:
+        raise InputError(f"member 'about': {str(wrong[0])[:80]!r} is not understood: {FIX}")
+
+
+def _is_matrix(rows, about):
+    try:
+        return np.array(rows, float).reshape(-1, len(about["shape"])).shape[0] <= DIRECTIONS
+    except (TypeError, ValueError):
+        return False

@@ -7,9 +7,7 @@ line that names file, row and fix.
 import codecs
 import csv
 import io
-import os
 import re
-import stat
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -18,8 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.files.reading import LARGEST_TEXT, read_bytes
+from pneunet.base.quantities import LARGEST_NUMBER
 
-LARGEST_FILE = 50_000_000  # bytes
 #: a longer cell is text behind a quote that was never closed
 LONGEST_CELL = 10_000
 MOST_ROWS = 200_000
@@ -36,9 +35,9 @@ _UNIT = re.compile(
 def read_text(path: str | Path) -> str:
     """The text of a file in UTF-8 (with or without mark), UTF-16 (with its mark) or Windows' Latin-1.
 
-    InputError for what is no regular file, larger than LARGEST_FILE, in another encoding or no text at all.
+    InputError for what is no regular file, larger than LARGEST_TEXT, in another encoding or no text at all.
     """
-    data = _read_bytes(path)
+    data = read_bytes(path, LARGEST_TEXT)
     if data.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(f"{path}: is a spreadsheet or an archive, not text: save the sheet as CSV")
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
@@ -56,26 +55,6 @@ def read_text(path: str | Path) -> str:
         row = text.count("\n", 0, found.start()) + 1
         raise InputError(f"{path} row {row}: holds {what}, so it is no text: save it as UTF-8 text")
     return text
-
-
-def _read_bytes(path):
-    if "\0" in str(path):
-        raise InputError("a file's name must not hold a NUL character")
-    try:
-        mode = os.stat(path).st_mode
-        if stat.S_ISDIR(mode):
-            raise InputError(f"{path}: is a folder: give the file in it")
-        if not stat.S_ISREG(mode):
-            raise InputError(f"{path}: is a pipe or a device, not a regular file: save it as a file first")
-        with open(path, "rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    if len(data) > LARGEST_FILE:
-        raise InputError(f"{path}: is over {LARGEST_FILE // 1_000_000} MB: keep the part that is needed")
-    return data
 
 
 @dataclass(eq=False)
@@ -117,7 +96,7 @@ class Table:
             cell = row[column] if column < len(row) else ""
             if cell or not gaps:
                 value = float(cell.replace(",", ".")) if _NUMBER.fullmatch(cell) else np.nan
-                if not np.isfinite(value):
+                if not abs(value) <= LARGEST_NUMBER:
                     said = f"'{cell[:40]}' is not a finite number" if cell else "is empty"
                     fix = "correct the cell or delete the row"
                     raise InputError(f"{self.path} row {self.lines[k]}: {said} under '{name[:80]}': {fix}")

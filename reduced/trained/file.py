@@ -1,15 +1,17 @@
 """The file of a trained law (.npz)."""
 
+from collections.abc import Collection
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.files.archive import read_archive, write_archive
+from pneunet.base.errors import InputError
+from pneunet.base.files.archive import Member, read_archive, write_archive
 from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.trained.closing import Closing
-from pneunet.reduced.trained.coordinates import LENGTHS
-from pneunet.reduced.trained.enthalpy import Anharmonic
+from pneunet.reduced.trained.coordinates import IN_SUMS, LENGTHS, Coordinates
+from pneunet.reduced.trained.enthalpy import Anharmonic, monomials
 from pneunet.reduced.trained.free_path import FreePath
 from pneunet.reduced.trained.free_stiffness import FreeStiffness
 from pneunet.reduced.trained.gaussian import GaussianProcess
@@ -17,12 +19,17 @@ from pneunet.reduced.trained.law import KindLaw, TrainedLaw
 from pneunet.reduced.trained.side_by_side import SideBySide
 
 SCHEMA = "pneunet-law-7"
+KEYS = {"kinds": list, "shape": list, "lengths": dict}
 #: fields of the Gaussian processes side by side that are the same in all of them
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
+#: a variance, or what is divided by
+POSITIVE = 1e-30
 #: what only deviations need, most of the file, in as few digits as they take (measured: ways in half
 #: precision change them by 2e-7)
 SHORT = {"observed": "f4", "ways": "f2", "trust": "f4", "group": "i4", "at": "i4"}
 PROCESSES = ("closing", "path", "start", "stiffness", "contact")
+#: processes that a kind is without where too few designs were seen to touch
+OPTIONAL = ("closing", "contact")
 ANHARMONIC = ("coefficients", "centre", "width", "reach")
 NUMBERS = ("noise", "common_noise", "slope_noise")
 
@@ -53,27 +60,84 @@ def _key(kind, name, number, field):
 
 def read_law(path: str | Path, name: str | None = None) -> TrainedLaw:
     """The law in a file, by default named like it; InputError when it is none or of another version."""
-    with read_archive(path, SCHEMA, "a trained law", "pneunet train") as (about, archive):
-        stored = dict(archive)  # what processes have in common is inflated once
-        kinds = {kind: _read_kind(stored, kind) for kind in about["kinds"]}
-        return TrainedLaw(kinds, about, name or str(path))
+    fix = "make it again with pneunet train"
+    about, stored = read_archive(path, SCHEMA, "a trained law", fix, KEYS, _members)
+    kinds = {kind: _read_kind(stored, kind) for kind in about["kinds"]}
+    return TrainedLaw(kinds, about, name or str(path))
+
+
+def _processes(kind, names):
+    """{name of processes side by side: (number of inputs, of outputs of each)}, the optional ones as the file
+    has them."""
+    inputs, coordinates = len(LENGTHS[kind]) + 3, Coordinates(kind)
+    strains, stiffness = len(coordinates.strain_parity), len(coordinates.stiffness_parity)
+    outputs = (1,), (1, strains - 1), (1,), (stiffness,), (1, stiffness - 1)
+    return {
+        name: (inputs + more, of_each)
+        for name, more, of_each in zip(PROCESSES, (-1, 1, 0, 0, 0), outputs)
+        if name not in OPTIONAL or any(each.startswith(f"{kind}/{name}/") for each in names)
+    }
+
+
+def _members(about: dict, names: Collection[str]) -> dict[str, Member]:
+    """What a law's file holds."""
+    out = {}
+    for kind in about["kinds"]:
+        if kind not in LENGTHS:
+            raise InputError(f"member 'about': kind {kind!r} is not known")
+        for name, (d, outputs) in _processes(kind, names).items():
+            m, n, r = (f"{kind} {name} {letter}" for letter in "mnr")
+            for number, p in enumerate(outputs):
+                noise = Member("f", low=0.0)
+                forms = {
+                    "shift": Member("f", (d,)),
+                    "width": Member("f", (d,), POSITIVE),
+                    "inducing": Member("f", (m, d)),
+                    "observed": Member("f", (n, d)),
+                    "group": Member("iu", (n,), 0),
+                    "trust": Member("f", (n,)),
+                    "at": Member("iu", (r,), 0, n),
+                    "ways": Member("f", (r, d)),
+                    "metric": Member("f", (d, f"{m} {number}")),
+                    "weights": Member("f", (f"{m} + 1 + {d}", p)),
+                    "variance": Member("f", (p,), POSITIVE),
+                    "noise": Member("f", (), POSITIVE),
+                    "common_noise": noise,
+                    "slope_noise": noise,
+                }
+                out |= {_key(kind, name, number, field): form for field, form in forms.items()}
+        d = len(LENGTHS[kind]) + 3
+        ranged = Member("f", (d + len(IN_SUMS[kind]),))
+        own = {
+            "furthest": Member("f", (), POSITIVE),
+            "quantile": Member("f", (6,), 0.0),
+            "low": ranged,
+            "high": ranged,
+            "doubt": Member("f", (), POSITIVE),
+            "level": Member("iu", (), 0, 100),
+            "anharmonic/coefficients": Member("f", (len(monomials(kind)), d + 2)),
+            "anharmonic/centre": Member("f", (d + 1,)),
+            "anharmonic/width": Member("f", (d + 1,), POSITIVE),
+            "anharmonic/reach": Member("f", (), 0.0),
+        }
+        out |= {f"{kind}/{name}": form for name, form in own.items()}
+    return out
 
 
 def _read_kind(stored, kind):
-    def processes(name):
-        found, number = [], 0
-        while f"{kind}/{name}/{number}/noise" in stored:
-            values = {f.name: stored[_key(kind, name, number, f.name)] for f in fields(GaussianProcess)}
-            values |= {field: float(values[field]) for field in NUMBERS}
-            found.append(GaussianProcess(**values))
-            number += 1
-        return SideBySide(tuple(found))
+    def process(name, number):
+        values = {f.name: stored[_key(kind, name, number, f.name)] for f in fields(GaussianProcess)}
+        return GaussianProcess(**values | {field: float(values[field]) for field in NUMBERS})
 
-    closing, learned, start, smooth, contact = map(processes, PROCESSES)
-    closes = Closing(kind, closing if closing.processes else None)
-    path = FreePath(kind, closes, learned, start, float(stored[f"{kind}/furthest"]))
-    stiffness = FreeStiffness(kind, smooth, contact if contact.processes else None)
+    there = _processes(kind, stored)
+    beside = {
+        name: SideBySide(tuple(process(name, number) for number in range(len(outputs))))
+        for name, (_, outputs) in there.items()
+    }
+    closing, learned, start, smooth, contact = map(beside.get, PROCESSES)
+    path = FreePath(kind, Closing(kind, closing), learned, start, float(stored[f"{kind}/furthest"]))
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, *(stored[f"{kind}/anharmonic/{name}"] for name in ANHARMONIC))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])
+    stiffness = FreeStiffness(kind, smooth, contact)
     return KindLaw(kind, path, stiffness, anharmonic, **plain, doubt=doubt, level=level)

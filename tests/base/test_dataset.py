@@ -19,6 +19,7 @@ def data():
         "meshes": [{"name": "coarse", "mesh_size_mm": 2.0}],
         "shape": [f"s{i}" for i in range(13)],
         "statuses": ["done", "crashed"],
+        "directions": {},
         "reasons": {"2": "ended by signal SIGSEGV"},
         "campaign": {"designs": 3},
         "ranges": {"one-sided": {"wall_mm": [0.8, 1.6]}, "twisting": {"wall_mm": [0.8, 1.6]}},

@@ -155,7 +155,7 @@ def test_columns_are_asked_for_by_names_that_are_there_once(tmp_path):
 
 def test_what_is_no_regular_file_is_refused_at_once(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe")
-    monkeypatch.setattr(text_files, "LARGEST_FILE", 2_000_000)
+    monkeypatch.setattr(text_files, "LARGEST_TEXT", 2_000_000)
     monkeypatch.setattr(text_files, "MOST_ROWS", 1000)
     (tmp_path / "large").write_text("1,2\n" * 500_001)
     (tmp_path / "long").write_text("1,2\n" * 1001)

@@ -6,9 +6,8 @@ factorised, so that the run which goes on iterates as the killed one would have.
 undeformed coordinates of their nodes, sorted by them: each rank finds its own.
 """
 
-import io
 import json
-from dataclasses import astuple
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import atomic_path
+from pneunet.base.files.archive import Member, read_archive, write_archive
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.fem.agreement import gathered, on_rank_0
 from pneunet.hifi.path.equilibrium import EquilibriumPath, LimitPoint, PathState
@@ -27,6 +26,25 @@ CHECKPOINT = "checkpoint.npz"
 #: mm; nodes of another mesh are further apart than this, and one that is moved by the rounding of its file is
 #: not
 NEAR = 1e-6
+SCHEMA = "pneunet-checkpoint-1"
+KEYS = {"belongs_to": dict, "stage": str}
+#: bytes of a checkpoint of the largest mesh
+LARGEST = 16_000_000_000
+#: what the file holds: a accepted states, s with the one that was factorised, the nodes of both fields
+MEMBERS = {
+    "step": Member("f", (len(fields(Step)),), gaps=True),
+    "parameter": Member("f", ("a",)),
+    "load": Member("f", ("s",)),
+    "volume": Member("f", ("a",)),
+    "trusted": Member("f", gaps=True),
+    "first_compliance": Member("f", gaps=True),
+    "limit_points": Member("f", ("limit points", 3)),
+    "timings": Member("f", ("timings",)),
+    "displacement_mm_nodes": Member("f", ("nodes", 3)),
+    "displacement_mm": Member("f", ("s", "nodes", 3)),
+    "multiplier_MPa_nodes": Member("f", ("multiplier nodes", 3)),
+    "multiplier_MPa": Member("f", ("s", "multiplier nodes")),
+}
 
 
 class Checkpoint:
@@ -45,8 +63,6 @@ class Checkpoint:
         factorised = [newton.factorised_at] if newton.current else []
         states = [a.state for a in path.accepted] + [state for state, _ in factorised]
         content = {
-            "belongs_to": _text(self.identity),
-            "stage": solve.stage,
             "step": np.array(astuple(solve.last_step), float),
             "parameter": np.array([a.parameter for a in path.accepted]),
             "load": np.array([a.load for a in path.accepted] + [load for _, load in factorised]),
@@ -65,35 +81,31 @@ class Checkpoint:
                 order = np.lexsort(np.round(X, 6).T)
                 content |= {f"{name}_nodes": X[order], name: np.array(values)[:, order]}
 
-        def write():
-            # a zip file on a full disk fails a second time, out of reach, when Python discards it
-            archive = io.BytesIO()
-            np.savez(archive, **content)
-            with atomic_path(self.directory / CHECKPOINT) as temporary:
-                temporary.write_bytes(archive.getbuffer())
-
-        on_rank_0(problem.mesh.comm, write)
+        about, path = {"belongs_to": self.identity, "stage": solve.stage}, self.directory / CHECKPOINT
+        on_rank_0(problem.mesh.comm, lambda: write_archive(path, SCHEMA, about, content))
 
 
-def read_checkpoint(directory: Path, identity: dict[str, Any]) -> dict[str, np.ndarray] | None:
-    """{name: array} of the checkpoint in `directory`, None without one; InputError when it is of something
-    else than `identity`."""
+def read_checkpoint(directory: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
+    """{name: array} of the checkpoint in `directory` and its "stage", None without one; InputError when it is
+    of something else than `identity`."""
     path = directory / CHECKPOINT
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            content = dict(stored)
-    except FileNotFoundError:
+    if not path.exists():
         return None
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: cannot be read ({error}): solve without --resume") from None
-    theirs, ours = json.loads(str(content["belongs_to"])), json.loads(_text(identity))
-    size = theirs["mesh_size_mm"]
+    about, content = read_archive(
+        path, SCHEMA, "a checkpoint", "solve without --resume", KEYS, lambda *_: MEMBERS, LARGEST
+    )
+    theirs, ours = about["belongs_to"], json.loads(json.dumps(identity, default=float))
+    size = theirs.get("mesh_size_mm")
     if size != ours["mesh_size_mm"]:
-        raise InputError(f"{path}: mesh_size_mm is {size:g} there: add --mesh-size-mm {size:g}")
+        raise InputError(f"{path}: mesh_size_mm is {size} there: add --mesh-size-mm {size}")
     for name, value in ours.items():
         if theirs.get(name) != value:
             raise InputError(f"{path}: belongs to another {name} than the design's: solve without --resume")
-    return content
+    accepted, states = len(content["parameter"]), len(content["load"])
+    # only the size of the next step may be infinite
+    if not 1 <= accepted <= states <= accepted + 1 or not np.isfinite(content["step"][:-1]).all():
+        raise InputError(f"{path}: members 'step', 'load' hold no accepted step: solve without --resume")
+    return content | {"stage": about["stage"]}
 
 
 def restore(content: dict[str, np.ndarray], path: EquilibriumPath) -> Step:
@@ -124,10 +136,6 @@ def restore(content: dict[str, np.ndarray], path: EquilibriumPath) -> Step:
     path.newton.timings = dict(zip(path.newton.timings, content["timings"].tolist()))
     number, load, iterations, factorisations, *rest = content["step"].tolist()
     return Step(int(number), load, int(iterations), int(factorisations), *rest)
-
-
-def _text(identity):
-    return json.dumps(identity, default=float, sort_keys=True)
 
 
 def _fields(problem):
