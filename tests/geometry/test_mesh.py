@@ -8,7 +8,7 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.geometry import Manipulator, Segment, tags
-from pneunet.geometry.cad import mesh
+from pneunet.geometry.cad import cell, mesh
 from pneunet.geometry.meshfile import MESH, open_edges, read_mesh, volumes_and_quality
 
 ONE_SIDED, TWISTING = Segment("one-sided", 70.0, 2), Segment("twisting", 60.0, 2, gap=2.0, cavity_floor=0.5)
