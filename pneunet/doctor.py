@@ -103,6 +103,7 @@ def probe(code: str, **env: str) -> tuple[bool, str]:
         done = subprocess.run(
             command,
             env={**os.environ, **env},
+            cwd=sys.prefix,  # no settings from the working directory
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

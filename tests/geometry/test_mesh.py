@@ -8,7 +8,7 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.geometry import Manipulator, Segment, tags
-from pneunet.geometry.cad import mesh
+from pneunet.geometry.cad import cell, mesh
 from pneunet.geometry.meshfile import MESH, open_edges, read_mesh, volumes_and_quality
 
 ONE_SIDED, TWISTING = Segment("one-sided", 70.0, 2), Segment("twisting", 60.0, 2, gap=2.0, cavity_floor=0.5)
@@ -85,6 +85,8 @@ def test_a_mesh_beyond_any_memory_is_refused_at_once(size, tmp_path):
     long = Manipulator((replace(ONE_SIDED, chambers=30),))
     with pytest.raises(InputError, match="mesh_size_mm = .* choose a coarser mesh"):
         mesh.mesh_manipulator(long, size, tmp_path / "mesh")
+    with pytest.raises(InputError, match="mesh_size_mm = .* choose a coarser mesh"):
+        cell.mesh_cell(replace(ONE_SIDED, width=500.0, wall=0.05), size, tmp_path / "cell.npz")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -184,6 +184,21 @@ def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):
     )
 
 
+def test_a_mesh_is_data(whole, tmp_path):
+    """A stranger's folder: its .msh is a script, its mesh.json fits the body; then its .npz is damaged."""
+    shutil.copytree(whole / "mesh", tmp_path / "mesh")
+    stored = tmp_path / "mesh" / "manipulator.npz"
+    stored.unlink()
+    obeyed = tmp_path / "obeyed"
+    stored.with_suffix(".msh").write_text(f'SystemCall "touch {obeyed}";\n')
+    told = solve(tmp_path, "--no-fields", "--pressure-kPa", "1")
+    assert told.returncode == 0 and "meshed anew" in told.stdout and stored.exists(), told.stderr
+    assert not obeyed.exists()
+    stored.write_bytes(stored.read_bytes()[:-2000])
+    told = solve(tmp_path, "--no-fields", "--pressure-kPa", "1", ranks=2)
+    assert told.returncode == 2 and told.stderr.count("\n") == 1 and str(stored) in told.stderr
+
+
 @pytest.mark.parametrize(
     ("ranks", "limit", "options"),
     [(1, 400_000, ["--no-fields"]), (2, 400_000, ["--no-fields"]), (2, 100_000, [])],

@@ -1,0 +1,64 @@
+"""The file that finite elements read: arrays alone, and refused in one line where they make no mesh."""
+
+import numpy as np
+import pytest
+
+from pneunet.base.errors import InputError
+from pneunet.base.files.archive import write_archive
+from pneunet.geometry import tags
+from pneunet.geometry.meshfile import SCHEMA, read_mesh
+
+CORNERS = np.vstack([np.zeros(3), np.eye(3)])
+GOOD = {
+    "points": CORNERS,
+    "tetrahedra": np.array([[0, 1, 2, 3]]),
+    "tetrahedron_tags": np.array([tags.BODY]),
+    "facets": np.array([[0, 1, 2], [1, 2, 3]]),
+    "facet_tags": np.array([tags.BASE, tags.CAVITY]),
+}
+
+
+def test_what_was_written_is_read(tmp_path):
+    write_archive(tmp_path / "mesh.npz", SCHEMA, {"cells": 1}, GOOD)
+    mesh, facts = read_mesh(tmp_path / "mesh.npz")
+    assert facts == {"cells": 1} and (mesh.tagged(tags.CAVITY) == [[1, 2, 3]]).all()
+    assert all((getattr(mesh, name) == array).all() for name, array in GOOD.items())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"points": CORNERS.astype(np.float32)}, "points is float32"),
+        ({"points": CORNERS[:, :2]}, "points is float64 (4, 2)"),
+        ({"points": np.array(1.0)}, "points is float64 ()"),
+        ({"points": CORNERS * [1, np.nan, 1]}, "not finite"),
+        ({"points": CORNERS * [1, 1, -1]}, "no positive volume"),
+        ({"points": CORNERS * [1, 1, 0]}, "no positive volume"),
+        ({"points": CORNERS * 1e200}, "no positive volume"),
+        ({"tetrahedra": np.array([[0, 1, 2, 4]])}, "none of the 4 points"),
+        ({"facets": np.array([[0, 1, 2], [1, 2, -3]])}, "none of the 4 points"),
+        ({"facets": np.array([[0.0, 1, 2], [1, 2, 3]])}, "facets is float64"),
+        ({"facets": np.zeros((0, 3), int), "facet_tags": np.zeros(0, int)}, "facets is int64 (0, 3)"),
+        ({"facet_tags": np.array([tags.BASE])}, "2 facets have 1 tags"),
+        ({"facet_tags": np.array([tags.BASE, 99])}, "facets have a tag"),
+        ({"tetrahedron_tags": np.array([tags.BASE])}, "tetrahedra have a tag"),
+        ({"tetrahedron_tags": np.array([{}], object)}, "not a mesh"),
+        ({"tetrahedron_tags": None}, "not a mesh"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_makes_no_mesh_is_refused(changes, message, tmp_path):
+    path = tmp_path / "mesh.npz"
+    content = {name: array for name, array in (GOOD | changes).items() if array is not None}
+    write_archive(path, SCHEMA, {}, content)
+    with pytest.raises(InputError) as refused:
+        read_mesh(path)
+    text = str(refused.value)
+    assert text.startswith(str(path)) and message in text and "make it again" in text and "\n" not in text
+
+
+def test_a_script_is_no_mesh(tmp_path):
+    path = tmp_path / "mesh.npz"
+    path.write_text('SystemCall "touch obeyed";\n')
+    with pytest.raises(InputError, match="not a mesh"):
+        read_mesh(path)
