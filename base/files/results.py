@@ -57,15 +57,11 @@ def read_run(directory: str | Path) -> Results:
 
     InputError where there is neither, or one cannot be read.
     """
-    directory, tables = Path(directory), {}
+    directory = Path(directory)
     record = read_record(directory / "run.json")
-    for name in ("", *PARTS):
-        folder = directory / name
-        for path in sorted(folder.glob("*.csv")):
-            tables[f"{name}/{path.stem}" if name else path.stem] = read_table(path)
-        told = read_record(folder / "run.json")
-        if name and told:
-            record[name] = told
+    record |= {part: told for part in PARTS if (told := read_record(directory / part / "run.json"))}
+    paths = [path for part in ("", *PARTS) for path in sorted((directory / part).glob("*.csv"))]
+    tables = {path.relative_to(directory).with_suffix("").as_posix(): read_table(path) for path in paths}
     if not tables and not record:
         raise InputError(f"{directory}: holds no tables (.csv) and no run.json: give the folder of a run")
     return Results(directory, record, tables)
