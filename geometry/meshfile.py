@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pneunet.base.errors import InputError, located
-from pneunet.base.files.archive import read_archive, write_archive
+from pneunet.base.files.archive import Member, read_archive, write_archive
 from pneunet.geometry import tags
 
 #: file of a manipulator's mesh
@@ -20,6 +20,14 @@ ARRAYS = {
     "tetrahedron_tags": (np.int64, ()),
     "facets": (np.int64, (3,)),
     "facet_tags": (np.int64, ()),
+}
+#: what the file holds
+MEMBERS = {
+    "points": Member("f", ("points", 3)),
+    "tetrahedra": Member("i", ("tetrahedra", 4), 0, "points"),
+    "tetrahedron_tags": Member("i", ("tetrahedra",), 0),
+    "facets": Member("i", ("facets", 3), 0, "points"),
+    "facet_tags": Member("i", ("facets",), 0),
 }
 
 
@@ -71,8 +79,8 @@ class TetrahedralMesh:
 
 def read_mesh(path: str | Path) -> tuple[TetrahedralMesh, dict[str, Any]]:
     """(mesh, facts) of an .npz; InputError naming the file where it is damaged or no mesh."""
-    with read_archive(path, SCHEMA, "a mesh", "pneunet mesh") as (facts, stored):
-        arrays = {name: stored[name] for name in ARRAYS}
+    fix = "make it again with pneunet mesh"
+    facts, arrays = read_archive(path, SCHEMA, "a mesh", fix, {}, lambda *_: MEMBERS)
     with located(f"{path}: damaged, make it again with pneunet mesh"):
         return TetrahedralMesh(**arrays), {k: v for k, v in facts.items() if k != "schema"}
 
