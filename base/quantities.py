@@ -30,7 +30,7 @@ class Allowed:
 
     def __contains__(self, value: Any) -> bool:
         if self.choices:
-            return value in self.choices
+            return isinstance(value, type(self.choices[0])) and value in self.choices
         try:
             return self.above < value and self.low <= value <= self.high
         except TypeError:
@@ -104,8 +104,14 @@ class Checked:
             if factor != 1.0 and isinstance(value, Real):
                 value = rounded(value / factor)
             if value not in allowed:
-                shown = f"{value:g}" if isinstance(value, float) else repr(value)
-                raise InputError(f"{key} = {shown} {allowed.refusal(value, field.metadata['unit'])}")
+                told = f"{value:g}" if isinstance(value, float) else shown(value)
+                raise InputError(f"{key} = {told} {allowed.refusal(value, field.metadata['unit'])}")
+
+
+def shown(value: object) -> str:
+    """A value as a message quotes it: not more of it than tells what it is."""
+    text = repr(value)
+    return text if len(text) <= 100 else f"{text[:80]} ..."
 
 
 def rounded(value: Any) -> float:

@@ -94,10 +94,11 @@ def _list(pressures):
 
 
 def _pictures(design, pressures, folder):
+    from pneunet.base.pictures.rendering import save_vtk
+
     bodies, view = _bodies(design, pressures)
     for p, body in zip(pressures, bodies):
-        with atomic_path(folder / f"body_{plain(p)}kPa.vtp") as temporary:
-            body.save(temporary)
+        save_vtk(body, folder / f"body_{plain(p)}kPa.vtp")
     _picture_of_all(design, view, pressures, bodies, folder / "bodies.png")
     log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
     highest = max(pressures)

@@ -7,7 +7,15 @@ import numpy as np
 
 from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import write_text
-from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown, to_table, toml_text
+from pneunet.base.files.toml import (
+    array,
+    as_table,
+    from_table,
+    read_toml,
+    refuse_unknown,
+    to_table,
+    toml_text,
+)
 from pneunet.base.materials.laws import Hyperelastic, material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.units import LARGEST_PRESSURE_KPA
@@ -109,13 +117,7 @@ def _base_pose(table, where):
     pose = np.eye(4)
     for key, shape, part in (("origin_mm", (3,), pose[:3, 3]), ("rotation", (3, 3), pose[:3, :3])):
         if key in table:
-            try:
-                value = np.array(table[key], float)
-            except (TypeError, ValueError):
-                value = np.empty(0)
-            if value.shape != shape or not np.isfinite(value).all():
-                raise InputError(f"{where}: '{key}' must be numbers of shape {shape}")
-            part[...] = value
+            part[...] = array(table[key], key, where, f"numbers of shape {shape}", shape)
     if abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max() > 1e-6 or np.linalg.det(pose[:3, :3]) < 0:
         raise InputError(f"{where}: 'rotation' is not a rotation matrix")
     return pose

@@ -33,16 +33,30 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+def real(text: str) -> float:
+    """A number in ASCII digits, nan for any other text."""
+    try:
+        return float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        return math.nan
+
+
+def path(text: str) -> Path:
+    """A name that a file can have."""
+    if not text.isprintable() or max(len(part.encode()) for part in Path(text).parts or ("",)) > 255:
+        raise argparse.ArgumentTypeError("no file is called so: control characters, or over 255 in a name")
+    if len(text) > 3000:
+        raise argparse.ArgumentTypeError("over 3000 characters are too long a path")
+    return Path(text)
+
+
 def pressures(text: str, least: float = math.ulp(0.0)) -> list[float]:
     """kPa of a comma-separated list."""
     values = []
     for word in text.split(","):
-        try:
-            value = float(word)
-        except ValueError:
-            raise argparse.ArgumentTypeError(
-                f"'{word}' is not a number; write for instance 10,20,30"
-            ) from None
+        value = real(word)
+        if math.isnan(value):
+            raise argparse.ArgumentTypeError(f"'{word}' is not a number; write for instance 10,20,30")
         if not least <= value <= LARGEST_PRESSURE_KPA:
             raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
         values.append(value)
@@ -58,10 +72,7 @@ def one_pressure(text: str) -> float:
 
 
 def _number(text: str, low: float, high: float, said: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = real(text)
     if not low <= value <= high:
         raise argparse.ArgumentTypeError(f"'{text}' must be a number {said}")
     return value
@@ -84,7 +95,7 @@ def gauge_length(text: str) -> float:
 
 def whole(text: str) -> int:
     """1 to 20000"""
-    if not text.isdecimal() or not 0 < int(text) <= 20_000:
+    if not (text.isascii() and text.isdecimal() and len(text) < 10) or not 0 < int(text) <= 20_000:
         raise argparse.ArgumentTypeError(f"'{text}' must be a whole number in 1..20000")
     return int(text)
 
@@ -113,7 +124,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
         argument("--outside", choices=("warn", "refuse"), default="warn", help=text)
 
     def add_output(argument, default, metavar="DIR"):
-        argument("-o", "--output", type=Path, metavar=metavar, help=f"default: {default}")
+        argument("-o", "--output", type=path, metavar=metavar, help=f"default: {default}")
 
     def add_retry(argument):
         text = "compute again what crashed, ran out of time or memory"
@@ -122,13 +133,13 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     finished = "; finished cases there are kept"
 
     a = add("design", "inverse design: target curve (CSV or TOML) -> design.toml, centreline.csv, design.png")
-    a("target", type=Path, help="a file, or the name of a shipped target: octopus, tentacle2, vase, pear")
+    a("target", type=path, help="a file, or the name of a shipped target: octopus, tentacle2, vase, pear")
     add_law(a, "trained")
     add_outside(a)
     add_output(a, "out/NAME of the target")
 
     a = add("shape", "reduced model only: centrelines, 3D body, picture and animation")
-    a("design", type=Path)
+    a("design", type=path)
     text = "default: five steps to the design's"
     a("--pressure-kPa", type=pressures, dest="pressures", metavar="10,20,...", help=text)
     add_law(a, "trained")
@@ -136,13 +147,13 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_output(a, "the design's folder")
 
     a = add("mesh", "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
-    a("design", type=Path)
+    a("design", type=path)
     a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     add_output(a, "the design's folder")
 
     text = "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml"
     a = add("solve", text)
-    a("design", type=Path)
+    a("design", type=path)
     text = "default: the design's; 0: its [loads] alone"
     a("--pressure-kPa", type=one_pressure, dest="pressure", help=text)
     a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
@@ -153,13 +164,13 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
 
     text = "one pitch of a long segment: strains, volume and rod stiffness over pressure, or at given strains"
     a = add("cell", text)
-    a("cell", type=Path, metavar="CELL.toml")
+    a("cell", type=path, metavar="CELL.toml")
     add_output(a, "the file's folder")
 
     text = "cells, segments or manipulators over a grid or a list"
     text += "; on MPI ranks: pneunet run -n 3 study STUDY.toml"
     a = add("study", text)
-    a("study", type=Path, metavar="STUDY.toml")
+    a("study", type=path, metavar="STUDY.toml")
     add_retry(a)
     add_output(a, f"out/NAME of the study{finished}")
 
@@ -167,14 +178,14 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
         "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml"
     )
     a = add("campaign", text)
-    a("campaign", type=Path, metavar="CAMPAIGN.toml")
+    a("campaign", type=path, metavar="CAMPAIGN.toml")
     text = "a data set whose cases are taken over, not computed again"
-    a("--extend", type=Path, metavar="DATA.npz", help=text)
+    a("--extend", type=path, metavar="DATA.npz", help=text)
     add_retry(a)
     add_output(a, f"out/NAME of the campaign{finished}")
 
     a = add("suggest", "further designs for a campaign: those that would teach the rod law most")
-    a("campaign", type=Path, metavar="CAMPAIGN.toml")
+    a("campaign", type=path, metavar="CAMPAIGN.toml")
     a("--kind", choices=("one-sided", "twisting"), required=True)
     a("-n", "--number", type=whole, default=100, metavar="100", help="how many; default: 100")
     text = "of how many designs that follow in the sample; default: 2000"
@@ -185,18 +196,18 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("--law", default="trained", metavar="LAW.npz", help=text)
 
     a = add("train", "the rod law from a data set of cells, with its errors on held-out designs")
-    a("data", type=Path, metavar="DATA.npz")
+    a("data", type=path, metavar="DATA.npz")
     text = "keep the metrics and noises of this law: for data that have grown"
-    a("--like", type=Path, metavar="LAW.npz", help=text)
+    a("--like", type=path, metavar="LAW.npz", help=text)
     a("--no-comparison", action="store_true", help="leave out the other laws and the learning curve")
     add_output(a, "law.npz beside the data; tables get the same name with .md", "LAW.npz")
 
     a = add("report", "one HTML page: target, reduced prediction and finite elements side by side")
-    a("directory", type=Path)
+    a("directory", type=path)
     add_law(a, None)
 
     a = add("fit-material", "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
-    a("test", type=Path, metavar="TENSILE.csv")
+    a("test", type=path, metavar="TENSILE.csv")
     text = "neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them"
     a("--law", default="all", help=text)
     a("--stress-unit", help="where the file names none: MPa, kPa, Pa, psi, ...")

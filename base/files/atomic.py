@@ -11,13 +11,24 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.files.text import read_text
+
+
+class NotWritten(InputError):
+    """A file could not be written: the disk is full, or the folder is not ours."""
 
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside `path` to write to; renamed onto it when the block ends without an
-    exception."""
-    path = Path(path)
+    """A temporary path beside `path` to write to; renamed onto it when the block ends without an exception.
+    NotWritten for one of the system's."""
+    with room_in(path):
+        with _replacing(Path(path)) as temporary:
+            yield temporary
+
+
+@contextmanager
+def _replacing(path):
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
     os.close(handle)
@@ -46,14 +57,13 @@ def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Iterable])
 
 
 def read_csv(path: str | Path) -> tuple[list[str], list[list[str]]]:
-    """(header, rows of text) of a CSV file; a missing file is an InputError."""
+    """(header, rows of text) of a CSV file that the project wrote itself; InputError when it is missing or
+    damaged."""
     try:
-        with open(path, newline="", encoding="utf-8") as stream:
-            rows = [row for row in csv.reader(stream) if row and any(cell.strip() for cell in row)]
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text ({error})") from None
+        reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
+        rows = [row for row in reader if row and any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot be read as CSV ({error}): is a quotation mark missing?") from None
     if not rows:
         raise InputError(f"{path}: is empty")
     return rows[0], rows[1:]
@@ -93,13 +103,15 @@ def output_directory(path: str | Path) -> Path:
 
 @contextmanager
 def room_in(directory: str | Path, then: str = "") -> Iterator[None]:
-    """Where `directory` is written to while work goes on: a full disk is an InputError that says what to do
+    """Where `directory` is written to while work goes on: a full disk is NotWritten, which says what to do
     `then`."""
     try:
         yield
+    except NotWritten as error:
+        raise NotWritten(f"{error}{then}") from None
     except OSError as error:
         why = error.strerror or error
-        raise InputError(f"{directory}: cannot be written to ({why}): make room there{then}") from None
+        raise NotWritten(f"{directory}: cannot be written to ({why}): make room there{then}") from None
 
 
 def require_writable(path: str | Path) -> None:

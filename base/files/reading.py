@@ -50,7 +50,7 @@ def read_bytes(path: str | Path, largest: int) -> bytes:
 
 
 def read_json(path: str | Path) -> dict[str, Any]:
-    """The table in a JSON file; InputError where something else stands in it."""
+    """The object in a JSON file; InputError where something else stands in it."""
     try:
         found = json.loads(read_bytes(path, LARGEST_JSON))
     except (ValueError, RecursionError) as error:
@@ -58,5 +58,5 @@ def read_json(path: str | Path) -> dict[str, Any]:
             raise
         raise InputError(f"{path}: not valid JSON ({error})") from None
     if not isinstance(found, dict):
-        raise InputError(f"{path}: must be a table of keys, not {type(found).__name__}")
+        raise InputError(f"{path}: must hold a JSON object, not {type(found).__name__}")
     return found

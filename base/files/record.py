@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
+from pneunet.base.files.reading import read_json
 
 #: folder that holds the packages of a checkout
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,16 +31,7 @@ def revision() -> str:
 
 def read_record(path: str | Path) -> dict:
     """The JSON object in a file, {} where there is no file; InputError for anything else."""
-    path = Path(path)
-    if not path.is_file():
-        return {}
-    try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path}: not valid JSON ({error})") from None
-    if not isinstance(told, dict):
-        raise InputError(f"{path}: must hold a JSON object, not {type(told).__name__}")
-    return told
+    return read_json(path) if Path(path).exists() else {}
 
 
 def machine() -> dict:

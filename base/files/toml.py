@@ -14,32 +14,59 @@ from dataclasses import MISSING, Field
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pneunet.base.errors import InputError, located
-from pneunet.base.quantities import quantities, rounded
+from pneunet.base.files.reading import LARGEST_TOML, read_bytes
+from pneunet.base.quantities import LARGEST_NUMBER, quantities, rounded, shown
 from pneunet.base.units import TO_INTERNAL
 
 Instance = TypeVar("Instance")
+#: levels of tables and lists; characters of a text
+DEEPEST, LONGEST_TEXT = 20, 10_000
 
 
 def read_toml(path: str | Path) -> dict:
-    """The tables of a TOML file; a missing or broken file is an InputError."""
-    path = Path(path)
+    """The tables of a TOML file; a missing, broken or outlandish file is an InputError."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, give the TOML file in it") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        tables = tomllib.loads(read_bytes(path, LARGEST_TOML).decode("utf-8-sig"))
+    except InputError:  # a ValueError too
+        raise
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML (brackets within brackets without end)") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not valid TOML (not text in UTF-8): save it as UTF-8") from None
+    except ValueError as error:  # of dates and whole numbers, too
         raise InputError(f"{path}: not valid TOML ({error})") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    _refuse_outlandish(tables, path)
+    return tables
+
+
+def _refuse_outlandish(tables, path):
+    """InputError for what TOML can say and no quantity, name or path is."""
+    todo = [(tables, "", 0)]
+    for value, key, depth in todo:
+        if depth > DEEPEST:
+            raise InputError(f"{path}: '{key}' is nested more than {DEEPEST} deep")
+        if isinstance(value, dict):
+            todo += [(each, name, depth + 1) for name, each in value.items()]
+            todo += [(name, name, depth) for name in value]
+        elif isinstance(value, list):
+            todo += [(each, key, depth + 1) for each in value]
+        elif isinstance(value, str):
+            if len(value) > LONGEST_TEXT:
+                raise InputError(f"{path}: '{key[:80]}' is a text of over {LONGEST_TEXT} characters")
+            if not value.replace("\n", " ").replace("\t", " ").isprintable():
+                raise InputError(f"{path}: '{key[:80]}' holds control characters: write plain text")
+        elif isinstance(value, (int, float)) and LARGEST_NUMBER < abs(value) < math.inf:
+            raise InputError(f"{path}: '{key}' is larger than any number can be here ({LARGEST_NUMBER:g})")
 
 
 def as_table(value: object, where: str) -> dict:
     """A copy of a TOML table; InputError when something else stands in its place."""
     if not isinstance(value, dict):
-        raise InputError(f"{where}: must be a table of keys, not {value!r}")
+        raise InputError(f"{where}: must be a table of keys, not {shown(value)}")
     return dict(value)
 
 
@@ -63,15 +90,30 @@ def number(value: Any, key: str, where: str, integer: bool = False) -> Any:
     wanted = int if integer else (int, float)
     if isinstance(value, bool) or not isinstance(value, wanted) or not math.isfinite(value):
         kind = "a whole number" if integer else "a finite number"
-        raise InputError(f"{where}: '{key}' must be {kind}, not {value!r}")
+        raise InputError(f"{where}: '{key}' must be {kind}, not {shown(value)}")
     return value
 
 
 def vector(value: object, key: str, where: str) -> tuple[float, ...]:
     """Three finite numbers as a tuple of floats, or an InputError naming the key."""
-    if not isinstance(value, (list, tuple)) or len(value) != 3:
-        raise InputError(f"{where}: '{key}' must be three numbers, [x, y, z], not {value!r}")
-    return tuple(float(number(v, key, where)) for v in value)
+    return tuple(array(value, key, where, "three numbers, [x, y, z]", (3,)).tolist())
+
+
+def array(
+    value: object, key: str, where: str, form: str, shape: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """Finite numbers in lists of this shape, None for any length; InputError naming the key and the `form`
+    wanted."""
+
+    def flat(value, sizes):
+        if not sizes:
+            return [float(number(value, key, where))]
+        if not isinstance(value, (list, tuple)) or sizes[0] not in (None, len(value)):
+            raise InputError(f"{where}: '{key}' must be {form}, not {shown(value)}")
+        return [each for row in value for each in flat(row, sizes[1:])]
+
+    lengths = [-1 if size is None else size for size in shape]
+    return np.array(flat(value, shape)).reshape(lengths)
 
 
 def from_table(cls: type[Instance], table: dict, where: str, **preset: Any) -> Instance:
@@ -102,7 +144,7 @@ def _read(value: object, key: str, field: Field, where: str) -> Any:
         return tuple(v * factor for v in vector(value, key, where))
     for kind, words in ((bool, "true or false"), (str, "text in quotes")):
         if field.type is kind and not isinstance(value, kind) and not field.metadata["allowed"]:
-            raise InputError(f"{where}: '{key}' must be {words}, not {value!r}")
+            raise InputError(f"{where}: '{key}' must be {words}, not {shown(value)}")
     return value
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pneunet.base.files.atomic import atomic_path
+from pneunet.base.files.atomic import atomic_path, write_text
 
 PIXELS = (900, 720)
 
@@ -36,6 +36,19 @@ def save(figure: Any, path: str | Path, dpi: float = 120) -> None:
     """Write a matplotlib Figure; the format follows from the path."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=dpi)
+
+
+def save_vtk(mesh: Any, path: str | Path) -> None:
+    """Write a surface (.vtp) or a grid (.vtu) of pyvista, as ParaView reads it."""
+    from vtkmodules import vtkIOXML
+
+    kind = {".vtp": vtkIOXML.vtkXMLPolyDataWriter, ".vtu": vtkIOXML.vtkXMLUnstructuredGridWriter}
+    writer: Any = kind[Path(path).suffix]()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()  # VTK itself crashes on a full disk
+    writer.Write()
+    write_text(path, writer.GetOutputString())
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from mpi4py import MPI
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import output_directory, write_text
+from pneunet.base.files.reading import read_json
 from pneunet.base.files.record import revision
 from pneunet.base.files.toml import as_table, from_table
 from pneunet.base.system.processes import Limits, environment_without_launcher, machine_memory_MB, run_limited
@@ -214,9 +215,11 @@ def _how_it_failed(ended, limits, log):
 def finished(case: Case, directory: str | Path) -> dict[str, Any] | None:
     """The record of a case that is on disk in directory/NAME, None when it is not finished."""
     try:
-        return json.loads((Path(directory) / case.name / RECORD).read_text())
-    except (FileNotFoundError, ValueError):
+        record = read_json(Path(directory) / case.name / RECORD)
+    except InputError:
         return None
+    whole = record.get("status") in STATUSES and {"reason", "result", "seconds", "revision"} <= set(record)
+    return record if whole else None
 
 
 def _unfinished(cases, directory, retry, records, on_record):

@@ -142,12 +142,12 @@ def test_a_layer_takes_its_own_material_or_the_common_one(tmp_path):
         (
             "chambers = 3",
             "chambers = 3\n[base]\norigin_mm = [1, 2]",
-            r"\[base\]: 'origin_mm' must be numbers",
+            r"\[base\]: 'origin_mm' must be (a finite number|numbers of shape)",
         ),
         (
             "chambers = 3",
             "chambers = 3\n[base]\norigin_mm = [1, 2, nan]",
-            r"\[base\]: 'origin_mm' must be numbers",
+            r"\[base\]: 'origin_mm' must be (a finite number|numbers of shape)",
         ),
         (
             "chambers = 3",

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.files.atomic import write_text
+from pneunet.base.pictures.rendering import save_vtk
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.fem import compat
@@ -88,7 +89,6 @@ class FieldWriter:
 
     def _save(self, fields, m):
         import pyvista
-        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
         cells = np.hstack([np.full((len(self._cells), 1), 10), self._cells[:, TO_VTK]])
         grid = pyvista.UnstructuredGrid(
@@ -99,12 +99,7 @@ class FieldWriter:
         for name, value in m.touch.marks.items():
             grid.field_data[name] = np.array([value], np.int32)
         name = _name(m.step)
-        writer = vtkXMLUnstructuredGridWriter()
-        writer.SetInputData(grid)
-        writer.SetDataModeToBinary()
-        writer.WriteToOutputStringOn()  # VTK itself crashes on a full disk
-        writer.Write()
-        write_text(self.directory / name, writer.GetOutputString())
+        save_vtk(grid, self.directory / name)
         self._listed.append((self.goal.time(m.step, m.pressure * KPA_PER_MPA), name))
         self._list()
 

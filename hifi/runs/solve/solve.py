@@ -1,6 +1,5 @@
 """`pneunet solve`: mesh, solve, record and resume a design."""
 
-import json
 import logging
 import time
 from collections.abc import Sequence
@@ -12,6 +11,8 @@ from mpi4py import MPI
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import output_directory, room_in
+from pneunet.base.files.reading import read_json
+from pneunet.base.files.record import read_record
 from pneunet.geometry.designfile import DesignFile, body_tables
 from pneunet.geometry.loading import Extras
 from pneunet.geometry.meshfile import MESH, read_mesh
@@ -175,7 +176,7 @@ def _go_on(kept, solve, goal, tables, out):
 
 def _extras_there(out):
     """What [measure] asked an earlier run for and got."""
-    record = json.loads((out / "run.json").read_text()) if (out / "run.json").exists() else {}
+    record = read_record(out / "run.json")
     return {name: record[name] for name in asdict(Extras()) if name in record}
 
 
@@ -210,6 +211,6 @@ def _mesh(design, folder, mesh_size):
 def _facts_for_people(folder):
     """What mesh.json says; None where it says nothing."""
     try:
-        return json.loads((folder / "mesh.json").read_text())
-    except (OSError, ValueError):
+        return read_json(folder / "mesh.json")
+    except InputError:
         return None
