@@ -15,6 +15,8 @@ from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads,
 from pneunet.geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
+#: coordinates of a base, mm: at a kilometre a rounding is still far below a tolerance
+FARTHEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,10 @@ def _base_pose(table, where):
                 value = np.array(table[key], float)
             except (TypeError, ValueError):
                 value = np.empty(0)
-            if value.shape != shape or not np.isfinite(value).all():
-                raise InputError(f"{where}: '{key}' must be numbers of shape {shape}")
+            if value.shape != shape or not (abs(value) <= FARTHEST).all():
+                raise InputError(
+                    f"{where}: '{key}' must be numbers of shape {shape}, up to {FARTHEST:g} in size"
+                )
             part[...] = value
     if abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max() > 1e-6 or np.linalg.det(pose[:3, :3]) < 0:
         raise InputError(f"{where}: 'rotation' is not a rotation matrix")
