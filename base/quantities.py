@@ -20,7 +20,8 @@ LARGEST_NUMBER = 1e30
 @dataclasses.dataclass(frozen=True)
 class Allowed:
     """The values that a quantity may take, in the unit of files: one of `choices` if there are any, else a
-    number larger than `above` in low..high. hint: what is probably wrong with another one."""
+    number larger than `above` in low..high, for a vector its magnitude. hint: what is probably wrong with
+    another one."""
 
     choices: tuple = ()
     above: float = -math.inf
@@ -101,6 +102,8 @@ class Checked:
             value = getattr(self, field.name)
             if value is None and field.default is None:
                 continue
+            if isinstance(value, tuple) and all(isinstance(v, Real) for v in value):
+                value = math.hypot(*value)
             if factor != 1.0 and isinstance(value, Real):
                 value = rounded(value / factor)
             if value not in allowed:

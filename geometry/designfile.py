@@ -23,6 +23,8 @@ from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads,
 from pneunet.geometry.parameters import Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
+#: coordinates of a base, mm: at a kilometre a rounding is still far below a tolerance
+FARTHEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,8 @@ def _base_pose(table, where):
     for key, shape, part in (("origin_mm", (3,), pose[:3, 3]), ("rotation", (3, 3), pose[:3, :3])):
         if key in table:
             part[...] = array(table[key], key, where, f"numbers of shape {shape}", shape)
+            if (abs(part) > FARTHEST).any():
+                raise InputError(f"{where}: '{key}' must be numbers up to {FARTHEST:g} in size")
     if abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max() > 1e-6 or np.linalg.det(pose[:3, :3]) < 0:
         raise InputError(f"{where}: 'rotation' is not a rotation matrix")
     return pose

@@ -15,7 +15,7 @@ CONTACTS = ("auto", "none")
 
 
 @dataclass(frozen=True)
-class DeadLoads:
+class DeadLoads(Checked):
     """Loads that keep their direction in space while the body moves, in the target's coordinates (where the
     base stands).
 
@@ -24,9 +24,9 @@ class DeadLoads:
     pressure.
     """
 
-    gravity: tuple = quantity("m_per_s2", (0.0, 0.0, 0.0))
-    tip_force: tuple = quantity("N", (0.0, 0.0, 0.0))
-    tip_moment: tuple = quantity("N_mm", (0.0, 0.0, 0.0))
+    gravity: tuple = quantity("m_per_s2", (0.0, 0.0, 0.0), low=0, high=1e4)
+    tip_force: tuple = quantity("N", (0.0, 0.0, 0.0), low=0, high=1e4)
+    tip_moment: tuple = quantity("N_mm", (0.0, 0.0, 0.0), low=0, high=1e6)
 
     def __bool__(self) -> bool:
         return any(any(getattr(self, f.name)) for f in fields(self))

@@ -12,8 +12,8 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from pneunet.base.errors import InputError
-from pneunet.base.materials.laws import Hyperelastic, NeoHookean
+from pneunet.base.errors import InputError, located
+from pneunet.base.materials.laws import BODY_LIMITS, Hyperelastic, NeoHookean
 from pneunet.base.quantities import Checked, quantity
 
 ONE_SIDED, TWISTING = "one-sided", "twisting"
@@ -53,6 +53,8 @@ class Segment(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        with located("material"):
+            self.material.check_limits(*BODY_LIMITS)
         self._check_layer()
         if 2 * self.side_wall >= self.width:
             raise InputError(

@@ -22,6 +22,9 @@ from pneunet.base.quantities import Checked, quantities, quantity
 
 #: a law that is not stable up to this stretch has a slip in its numbers
 STABLE_AT_LEAST = 1.2
+#: largest shear modulus in MPa and smallest bulk modulus over it: of a body, and of a layer in it. Paper has
+#: some GPa and a Poisson's ratio of 0.2
+BODY_LIMITS, LAYER_LIMITS = (100, 5), (1e4, 1.33)
 
 Law = TypeVar("Law")
 
@@ -60,7 +63,7 @@ class Hyperelastic(Checked):
     engineering strain, inf = not known. Infinite values are not written to files.
     """
 
-    density: float = quantity("kg_per_m3", 1.07e-9, "mass density", low=0, high=1e5)
+    density: float = quantity("kg_per_m3", 1.07e-9, "mass density", low=50, high=25e3, hint="is it in g/cm3?")
     bulk_modulus: float = quantity("MPa", math.inf, note="incompressible unless given")
     elongation_at_break: float = quantity("percent", math.inf, "engineering strain at break", above=0)
     name: str = quantity(None, "silicone", "free text")
@@ -98,21 +101,11 @@ class Hyperelastic(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_law()
-        if not 1e-4 <= self.mu <= 1e3:
+        if not self.mu > 0:
             raise InputError(
-                f"{self.stiffness} = {self.mu:g} is outside 1e-4..1e3 MPa: silicones lie in 0.01..2 MPa; is"
-                " it in kPa?"
-                if self.mu > 0
-                else (
-                    f"{self.stiffness} = {self.mu:g} must be larger than 0: the initial shear modulus would"
-                    " not be positive"
-                )
+                f"{self.stiffness} = {self.mu:g} must be larger than 0: it is the initial shear modulus"
             )
-        if not self.bulk_modulus >= 5 * self.mu:
-            raise InputError(
-                f"bulk_modulus_MPa = {self.bulk_modulus:g} is less than 5 shear moduli ({self.mu:g} MPa): not"
-                " a rubber; leave it out for an incompressible one"
-            )
+        self.check_limits(*LAYER_LIMITS)
         for mode in MODES:
             limit = stable_stretch(self, mode, STABLE_AT_LEAST)
             if limit < math.inf:
@@ -120,6 +113,20 @@ class Hyperelastic(Checked):
                     f"law = '{self.law}': these parameters are unstable from stretch {limit:.3g} on in"
                     f" {mode}: check signs"
                 )
+
+    def check_limits(self, stiffest: float, least_bulk: float) -> None:
+        """InputError for a shear modulus over `stiffest` MPa, or a bulk modulus below `least_bulk` times the
+        shear modulus."""
+        if not 1e-4 <= self.mu <= stiffest:
+            raise InputError(
+                f"{self.stiffness} = {self.mu:g} is outside 1e-4..{stiffest:g} MPa: silicones lie in 0.01..2"
+                " MPa; is it in kPa?"
+            )
+        if not self.bulk_modulus >= least_bulk * self.mu:
+            raise InputError(
+                f"bulk_modulus_MPa = {self.bulk_modulus:g} is less than {least_bulk:g} shear moduli"
+                f" ({self.mu:g} MPa): too compressible here; leave it out for an incompressible material"
+            )
 
     def __init_subclass__(cls) -> None:
         #: names of the law's own parameters, in order
@@ -293,15 +300,37 @@ def silicone(name: str) -> Hyperelastic:
     return material_from_table(measured_silicone(name), "silicone")
 
 
+@dataclass(frozen=True)
+class _Engineering(Checked):
+    """What data sheets of stiff materials say."""
+
+    youngs_modulus: float = quantity("MPa", above=0)
+    poisson_ratio: float = quantity(None, low=0.2, high=0.5)
+
+    @property
+    def moduli(self) -> dict[str, float]:
+        nu, own = self.poisson_ratio, {"mu_MPa": self.youngs_modulus / 2 / (1 + self.poisson_ratio)}
+        return own if nu == 0.5 else own | {"bulk_modulus_MPa": self.youngs_modulus / 3 / (1 - 2 * nu)}
+
+
 def material_from_table(table: dict, where: str) -> Hyperelastic:
     """A law from its TOML table: `law = "..."` (default neo-Hookean) with its parameters, or `silicone =
-    "..."`, the law of a row in base.materials.silicones, of which further keys replace values."""
+    "..."`, the law of a row in base.materials.silicones, of which further keys replace values, or the
+    engineering constants `youngs_modulus_MPa` and `poisson_ratio` of a neo-Hookean one."""
     table = as_table(table, where)
     if "silicone" in table:
         if "law" in table:
             raise InputError(f"{where}: 'silicone' and 'law' exclude each other: a silicone has its law")
         with located(where):
             table = {**measured_silicone(table.pop("silicone")), **table}
+    constants = {key: table.pop(key) for key in quantities(_Engineering) if key in table}
+    if constants:
+        for key in ("law", "silicone", "mu_MPa", "bulk_modulus_MPa"):
+            if key in table:
+                raise InputError(
+                    f"{where}: '{key}' and '{next(iter(constants))}' exclude each other: give one"
+                )
+        table |= from_table(_Engineering, constants, where).moduli
     law = table.pop("law", NeoHookean.law)
     if law not in tuple(LAWS):
         raise InputError(f"{where}: unknown law '{law}': known laws are {', '.join(LAWS)}")

@@ -28,8 +28,8 @@ class Limits(Checked):
     """What one child may take: wall time in s, memory (RLIMIT_DATA: heap and private maps of each process) in
     MB; None: all."""
 
-    seconds: float | None = quantity("s", None, key="time_s", above=0)
-    memory_MB: float | None = quantity("MB", None, key="memory_MB", above=0)
+    seconds: float | None = quantity("s", None, key="time_s", above=0, low=1e-3, high=1e9)
+    memory_MB: float | None = quantity("MB", None, key="memory_MB", low=10, high=1e8)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
 """CELL.toml: the case of a unit cell that `pneunet cell` and studies solve."""
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, from_table, number, read_toml, refuse_unknown, to_table
+from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown, to_table
 from pneunet.base.materials.laws import material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
@@ -14,9 +14,23 @@ from pneunet.geometry.parameters import Segment
 from pneunet.hifi.contact.medium import ThirdMedium
 from pneunet.hifi.contact.penalty import WallPenalty
 
-STRAINS = ("e1", "e2", "e3", "k1_per_mm", "k2_per_mm", "k3_per_mm")
 #: size at the body's edges of a graded mesh, over its mesh_size
 EDGE = 0.2
+
+
+@dataclass(frozen=True)
+class Held(Checked):
+    """Strains of the section frame that are prescribed; None: free."""
+
+    e1: float | None = quantity(None, None, low=0.2, high=5, hint="it is a stretch, 1 at rest")
+    e2: float | None = quantity(None, None, low=-2, high=2)
+    e3: float | None = quantity(None, None, low=-2, high=2)
+    k1: float | None = quantity("per_mm", None, low=-2, high=2)
+    k2: float | None = quantity("per_mm", None, low=-2, high=2)
+    k3: float | None = quantity("per_mm", None, low=-2, high=2)
+
+
+STRAINS = tuple(quantities(Held))
 
 
 @dataclass(frozen=True)
@@ -64,8 +78,7 @@ def cell_from_tables(data: dict[str, Any], where: str) -> CellCase:
     for key in ("material", "segment", "pressure_kPa"):
         if key not in data and not (key == "pressure_kPa" and data.get("control") == "volume"):
             raise InputError(f"{where}: key '{key}' is missing")
-    held = as_table(data.get("held", {}), f"{where} [held]")
-    refuse_unknown(held, STRAINS, f"{where} [held]")
+    held = astuple(from_table(Held, data.get("held", {}), f"{where} [held]"))
     row = as_table(data["segment"], f"{where} [segment]")
     row.setdefault("chambers", 1)
     materials = [
@@ -77,7 +90,7 @@ def cell_from_tables(data: dict[str, Any], where: str) -> CellCase:
         {key: data[key] for key in quantities(CellCase) if key in data},
         where,
         segment=segment_from_table(row, f"{where} [segment]", *materials),
-        held={STRAINS.index(key): float(number(v, key, f"{where} [held]")) for key, v in held.items()},
+        held={i: float(value) for i, value in enumerate(held) if value is not None},
     )
 
 

@@ -132,6 +132,15 @@ def test_material_reads_back_with_its_law():
             "file: unknown law 'Fung': known laws are neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden",
         ),
         ({}, "file: key 'mu_MPa' is missing"),
+        ({"youngs_modulus_MPa": 6500}, "file: key 'poisson_ratio' is missing"),
+        (
+            {"youngs_modulus_MPa": 6500, "poisson_ratio": 0.1},
+            "poisson_ratio = 0.1 must lie in 0.2..0.5",
+        ),
+        (
+            {"youngs_modulus_MPa": 6500, "poisson_ratio": 0.2, "mu_MPa": 1},
+            "file: 'mu_MPa' and 'youngs_modulus_MPa' exclude each other: give one",
+        ),
     ],
 )
 def test_wrong_materials_are_named(table, message):

@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import fsolve
 
 from pneunet.base.materials.hyperelastic import MODES, nominal_stress, shear_stress, slopes
-from pneunet.base.materials.laws import Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from pneunet.base.materials.laws import Gent, MooneyRivlin, NeoHookean, Ogden, Yeoh, material_from_table
 from pneunet.hifi.body.problem import BodyProblem
 from pneunet.hifi.verification import bodies
 from tests.toy_law import Demiray
@@ -164,6 +164,21 @@ def test_a_finite_bulk_modulus_changes_the_volume(cube):
     assert soft.work(np.diag([1, 0, 0])) == pytest.approx(stresses([side])[0] / 1.5, rel=1e-9)
     assert soft.work(np.diag([0, 0, 1])) == pytest.approx(0, abs=1e-9)
     assert soft.work(np.zeros((3, 3)), 1.0) == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("nu", [0.2, 0.35])
+def test_a_stiff_layer_of_paper_follows_hookes_law(cubes, nu):
+    """Its Young's modulus and Poisson's ratio come back at small strain, in tension and in shear."""
+    paper = Cube(material_from_table({"youngs_modulus_MPa": 6500, "poisson_ratio": nu}, "paper"))
+    strain = 1e-6
+    pressure = paper.material.bulk_modulus * strain * (1 - 2 * nu)
+    paper.set(np.diag([1 + strain, 1 - nu * strain, 1 - nu * strain]), pressure)
+    assert paper.work(np.diag([1, 0, 0])) / strain == pytest.approx(6500, rel=1e-5)
+    assert paper.work(np.diag([0, 1, 0])) / strain == pytest.approx(0, abs=0.1)
+    assert paper.work(np.zeros((3, 3)), 1.0) / strain == pytest.approx(0, abs=1e-5)
+    paper.set([[1, strain, 0], [0, 1, 0], [0, 0, 1]], 0.0)
+    shear = paper.work([[0, 1, 0], [0, 0, 0], [0, 0, 0]]) / strain
+    assert shear == pytest.approx(6500 / 2 / (1 + nu), rel=1e-5)
 
 
 def test_beyond_gents_limit_there_is_no_stress():

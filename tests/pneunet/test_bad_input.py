@@ -166,6 +166,28 @@ DESIGNS = {
     "half a chamber": ("chambers = 2", "chambers = 2.5", "'chambers' must be a whole number, not 2.5"),
     "not a number": ("mu_MPa = 0.3", "mu_MPa = nan", "'mu_MPa' must be a finite number, not nan"),
     "modulus in kPa": ("mu_MPa = 0.3", "mu_MPa = 3e4", "is it in kPa?"),
+    "modulus of a layer": ("mu_MPa = 0.3", "mu_MPa = 317", "material: mu_MPa = 317 is outside 1e-4..100 MPa"),
+    "foam": ("[material]", "[material]\nbulk_modulus_MPa = 1", "1 is less than 5 shear moduli (0.3 MPa)"),
+    "density in g/cm3": (
+        "[material]",
+        "[material]\ndensity_kg_per_m3 = 1.07",
+        "density_kg_per_m3 = 1.07 must lie in 50..25000 kg/m3: is it in g/cm3?",
+    ),
+    "gravity": (
+        "[material]",
+        "[loads]\ngravity_m_per_s2 = [0, 0, -1e300]\n[material]",
+        "[loads]: gravity_m_per_s2 = 1e+300 must lie in 0..10000 m/s2",
+    ),
+    "tip force": (
+        "[material]",
+        "[loads]\ntip_force_N = [0, 0, 1e12]\n[material]",
+        "[loads]: tip_force_N = 1e+12 must lie in 0..10000 N",
+    ),
+    "origin": (
+        "[material]",
+        "[base]\norigin_mm = [1e300, 0, 0]\n[material]",
+        "[base]: 'origin_mm' must be numbers of shape (3,), up to 1e+06 in size",
+    ),
     "no pressure": ("pressure_kPa = 20", "pressure_kPa = 0", "pressure_kPa = 0 leaves nothing to solve"),
     "no material": ("[material]\nmu_MPa = 0.3", "", "key 'material' is missing"),
     "not TOML": ("chambers = 2", "chambers = two", "not valid TOML"),
@@ -354,6 +376,17 @@ STUDIES = {
         "[limits]\nmemory_GB = 2\n[grid]",
         "[limits]: key 'memory_GB' has the wrong unit: write 'memory_MB'",
     ),
+    "memory too small": (
+        "[grid]",
+        "[limits]\nmemory_MB = 1e-9\n[grid]",
+        "[limits]: memory_MB = 1e-09 must lie in 10..1e+08 MB",
+    ),
+    "memory too large": ("[grid]", "[limits]\nmemory_MB = 1e13\n[grid]", "memory_MB = 1e+13 must lie in"),
+    "grid too large": (
+        "[1, 1.2]",
+        f"{list(range(1, 1001))}\ngap_mm = {list(range(1, 1001))}",
+        "1000000 cases are more than the 10000 of one study: vary less, or coarser",
+    ),
     "limit's value": ("[grid]", "[limits]\ntime_s = 0\n[grid]", "time_s = 0 must be larger than 0"),
     "two segments": ("[base.segment]", "[[base.segment]]", "a cell has one segment"),
 }
@@ -375,6 +408,16 @@ kind = "one-sided"
 angle_deg = 60
 """
 CELLS = {
+    "held curvature": (
+        "[material]",
+        "[held]\nk1_per_mm = 1e300\n[material]",
+        "k1_per_mm = 1e+300 must lie in -2..2",
+    ),
+    "held stretch": (
+        "[material]",
+        "[held]\ne1 = 0\n[material]",
+        "[held]: e1 = 0 must lie in 0.2..5: it is a stretch",
+    ),
     "unit": ("pressure_kPa = 10", "pressure_MPa = 0.01", "write 'pressure_kPa'"),
     "no pressure": ("pressure_kPa = 10\n", "", "'pressure_kPa' is missing"),
     "control": ("levels = 2", "control = 'force'", "write 'pressure' or 'volume'"),

@@ -96,6 +96,8 @@ class Campaign:
 def read_campaign(path: str | Path) -> Campaign:
     """The Campaign in a TOML file; InputError that names key and fix otherwise."""
     data, where = read_toml(path), str(path)
+    if not data:
+        raise InputError(f"{where}: is empty: write at least designs = {Numbers.designs}")
     refuse_unknown(data, KEYS, where)
 
     kinds = data.get("kinds", list(KINDS))

@@ -8,6 +8,7 @@ can be varied.
 import copy
 import itertools
 import json
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,9 @@ NAMES_OF_MATERIALS = ("silicone", "law")
 #: values at the top of a design.toml and of a CELL.toml, and at that of the latter alone
 COMMON_KEYS = ("pressure_kPa", "mesh_size_mm", "contact")
 CELL_KEYS = (*COMMON_KEYS, "control", "volume_factor")
+
+#: in one study; so many are read in seconds
+MOST_CASES = 10_000
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,11 @@ def read_study(path: str | Path) -> Study:
     own = {key: tables[key] for tables in (base, data) for key in quantities(Study) if key in tables}
     study = from_table(Study, own, where, limits=case_limits(data, where))
     listed, grid = _varied(data, base, where)
+    count = len(listed) * math.prod(map(len, grid.values()))
+    if count > MOST_CASES:
+        raise InputError(
+            f"{where}: {count} cases are more than the {MOST_CASES} of one study: vary less, or coarser"
+        )
     cases = []
     for row in listed:
         for combination in itertools.product(*grid.values()):
