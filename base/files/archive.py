@@ -41,8 +41,8 @@ class Member:
         if kind not in self.kinds:
             raise InputError(f"its type is of kind '{kind}', not '{self.kinds}'")
         if len(shape) == len(self.shape):
-            for size, wanted in zip(shape, self.shape):
-                sizes.setdefault(str(wanted), size)
+            for size, name in zip(shape, self.shape):
+                sizes.setdefault(str(name), size)
         wanted = tuple(_size(each, sizes) for each in self.shape)
         if shape != wanted:
             raise InputError(f"has shape {shape}, not {wanted}")

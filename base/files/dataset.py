@@ -204,8 +204,11 @@ def _members(about, _):
     for f in columns():
         kind = {"i": "iu", "f": "f", "?": "b"}[f.metadata["type"][0]]
         of, index_of = f.metadata["of"], f.metadata["index_of"]
-        bounds = (0, len(about[index_of]) if index_of in about else index_of) if index_of else ()
-        members[f.name] = Member(kind, (of, *f.metadata["shape"]), *bounds, gaps=f.metadata["gaps"])
+        form, gaps = (of, *f.metadata["shape"]), f.metadata["gaps"]
+        members[f.name] = Member(kind, form, gaps=gaps)
+        if index_of:
+            below = len(about[index_of]) if index_of in about else index_of
+            members[f.name] = Member(kind, form, 0, below, gaps)
     return members
 
 

@@ -81,7 +81,7 @@ def _processes(kind, names):
 
 def _members(about: dict, names: Collection[str]) -> dict[str, Member]:
     """What a law's file holds."""
-    out = {}
+    out: dict[str, Member] = {}
     for kind in about["kinds"]:
         if kind not in LENGTHS:
             raise InputError(f"member 'about': kind {kind!r} is not known")
@@ -134,10 +134,11 @@ def _read_kind(stored, kind):
         name: SideBySide(tuple(process(name, number) for number in range(len(outputs))))
         for name, (_, outputs) in there.items()
     }
-    closing, learned, start, smooth, contact = map(beside.get, PROCESSES)
-    path = FreePath(kind, Closing(kind, closing), learned, start, float(stored[f"{kind}/furthest"]))
+    closing, learned, start, smooth, contact = PROCESSES  # of how walls close and touch there may be none
+    known = Closing(kind, beside.get(closing)), beside[learned], beside[start]
+    path = FreePath(kind, *known, float(stored[f"{kind}/furthest"]))
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, *(stored[f"{kind}/anharmonic/{name}"] for name in ANHARMONIC))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])
-    stiffness = FreeStiffness(kind, smooth, contact)
+    stiffness = FreeStiffness(kind, beside[smooth], beside.get(contact))
     return KindLaw(kind, path, stiffness, anharmonic, **plain, doubt=doubt, level=level)
