@@ -7,19 +7,18 @@ from typing import Any
 import numpy as np
 
 from pneunet.base.errors import InputError, located
-from pneunet.base.files.archive import read_archive, write_archive
+from pneunet.base.files.archive import Member, read_archive, write_archive
 from pneunet.geometry import tags
 
 #: file of a manipulator's mesh
 MESH = "manipulator.npz"
-SCHEMA = "pneunet mesh 1"
-#: name -> (type, shape of a row)
-ARRAYS = {
-    "points": (np.float64, (3,)),
-    "tetrahedra": (np.int64, (4,)),
-    "tetrahedron_tags": (np.int64, ()),
-    "facets": (np.int64, (3,)),
-    "facet_tags": (np.int64, ()),
+SCHEMA, AGAIN = "pneunet mesh 1", "make it again with pneunet mesh"
+MEMBERS = {
+    "points": Member("f", ("points", 3)),
+    "tetrahedra": Member("i", ("tetrahedra", 4), 0, "points"),
+    "tetrahedron_tags": Member("i", ("tetrahedra",), tags.BODY, tags.GAP + 1),
+    "facets": Member("i", ("facets", 3), 0, "points"),
+    "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.OUTER + 1),
 }
 
 
@@ -28,7 +27,7 @@ class TetrahedralMesh:
     """points (n, 3) in mm; tetrahedra (m, 4) and tagged facets (k, 3) as numbers of points, with their tags
     (m,) and (k,) of geometry.tags.
 
-    InputError where types, shapes, numbers or tags are not such, or a tetrahedron has no positive volume.
+    InputError where a tetrahedron has no positive volume.
     """
 
     points: np.ndarray
@@ -38,26 +37,9 @@ class TetrahedralMesh:
     facet_tags: np.ndarray
 
     def __post_init__(self) -> None:
-        for name, (kind, row) in ARRAYS.items():
-            array = getattr(self, name)
-            if array.dtype != kind or array.ndim == 0 or array.shape[1:] != row or not len(array):
-                shape = ", ".join(map(str, ("n", *row)))
-                raise InputError(f"{name} is {array.dtype} {array.shape}, not {kind.__name__} ({shape})")
-        for what, corners, given, known in (
-            ("tetrahedra", self.tetrahedra, self.tetrahedron_tags, tags.is_volume),
-            ("facets", self.facets, self.facet_tags, tags.is_face),
-        ):
-            if len(given) != len(corners):
-                raise InputError(f"{len(corners)} {what} have {len(given)} tags")
-            if not known(given).all():
-                raise InputError(f"{what} have a tag that no part of a body has")
-            if corners.min() < 0 or corners.max() >= len(self.points):
-                raise InputError(f"{what} have a corner that is none of the {len(self.points)} points")
-        if not np.isfinite(self.points).all():
-            raise InputError("points has a coordinate that is not finite")
         with np.errstate(all="ignore"):
             volumes, _ = volumes_and_quality(self.points[self.tetrahedra])
-        if not ((volumes > 0) & np.isfinite(volumes)).all():
+        if not len(volumes) or not ((volumes > 0) & np.isfinite(volumes)).all():
             raise InputError("a tetrahedron has no positive volume: take another mesh_size_mm")
 
     def tagged(self, tag: int) -> np.ndarray:
@@ -71,10 +53,12 @@ class TetrahedralMesh:
 
 def read_mesh(path: str | Path) -> tuple[TetrahedralMesh, dict[str, Any]]:
     """(mesh, facts) of an .npz; InputError naming the file where it is damaged or no mesh."""
-    with read_archive(path, SCHEMA, "a mesh", "pneunet mesh") as (facts, stored):
-        arrays = {name: stored[name] for name in ARRAYS}
-    with located(f"{path}: damaged, make it again with pneunet mesh"):
-        return TetrahedralMesh(**arrays), {k: v for k, v in facts.items() if k != "schema"}
+    facts, stored = read_archive(path, SCHEMA, "a mesh", AGAIN, {}, lambda about, names: MEMBERS)
+    with located(path):
+        mesh = TetrahedralMesh(
+            *(stored[name].astype(np.float64 if name == "points" else np.int64) for name in MEMBERS)
+        )
+    return mesh, {name: value for name, value in facts.items() if name != "schema"}
 
 
 def volumes_and_quality(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
