@@ -12,14 +12,13 @@ from pneunet.geometry import tags
 
 #: file of a manipulator's mesh
 MESH = "manipulator.npz"
-SCHEMA = "pneunet mesh 1"
-#: what a file holds: n points, m tetrahedra, k facets
+SCHEMA, AGAIN = "pneunet mesh 1", "make it again with pneunet mesh"
 MEMBERS = {
-    "points": Member("f", ("n", 3)),
-    "tetrahedra": Member("i", ("m", 4), 0, "n"),
-    "tetrahedron_tags": Member("i", ("m",)),
-    "facets": Member("i", ("k", 3), 0, "n"),
-    "facet_tags": Member("i", ("k",)),
+    "points": Member("f", ("points", 3)),
+    "tetrahedra": Member("i", ("tetrahedra", 4), 0, "points"),
+    "tetrahedron_tags": Member("i", ("tetrahedra",), tags.BODY, tags.GAP + 1),
+    "facets": Member("i", ("facets", 3), 0, "points"),
+    "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.OUTER + 1),
 }
 
 
@@ -28,7 +27,7 @@ class TetrahedralMesh:
     """points (n, 3) in mm; tetrahedra (m, 4) and tagged facets (k, 3) as numbers of points, with their tags
     (m,) and (k,) of geometry.tags.
 
-    InputError where a tag is of no part of a body, or a tetrahedron has no positive volume.
+    InputError where a tetrahedron has no positive volume.
     """
 
     points: np.ndarray
@@ -38,15 +37,9 @@ class TetrahedralMesh:
     facet_tags: np.ndarray
 
     def __post_init__(self) -> None:
-        for what, given, known in (
-            ("tetrahedra", self.tetrahedron_tags, tags.is_volume),
-            ("facets", self.facet_tags, tags.is_face),
-        ):
-            if not len(given) or not known(given).all():
-                raise InputError(f"{what} have a tag that no part of a body has")
         with np.errstate(all="ignore"):
             volumes, _ = volumes_and_quality(self.points[self.tetrahedra])
-        if not ((volumes > 0) & np.isfinite(volumes)).all():
+        if not len(volumes) or not ((volumes > 0) & np.isfinite(volumes)).all():
             raise InputError("a tetrahedron has no positive volume: take another mesh_size_mm")
 
     def tagged(self, tag: int) -> np.ndarray:
@@ -60,10 +53,12 @@ class TetrahedralMesh:
 
 def read_mesh(path: str | Path) -> tuple[TetrahedralMesh, dict[str, Any]]:
     """(mesh, facts) of an .npz; InputError naming the file where it is damaged or no mesh."""
-    fix = "make it again with pneunet mesh"
-    facts, arrays = read_archive(path, SCHEMA, "a mesh", fix, {}, lambda about, names: MEMBERS)
-    with located(f"{path}: damaged, {fix}"):
-        return TetrahedralMesh(**arrays), {k: v for k, v in facts.items() if k != "schema"}
+    facts, stored = read_archive(path, SCHEMA, "a mesh", AGAIN, {}, lambda about, names: MEMBERS)
+    with located(path):
+        mesh = TetrahedralMesh(
+            *(stored[name].astype(np.float64 if name == "points" else np.int64) for name in MEMBERS)
+        )
+    return mesh, {name: value for name, value in facts.items() if name != "schema"}
 
 
 def volumes_and_quality(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

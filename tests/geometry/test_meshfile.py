@@ -28,22 +28,22 @@ def test_what_was_written_is_read(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"points": CORNERS.astype(np.float32)}, "points is float32"),
-        ({"points": CORNERS[:, :2]}, "points is float64 (4, 2)"),
-        ({"points": np.array(1.0)}, "points is float64 ()"),
-        ({"points": CORNERS * [1, np.nan, 1]}, "not finite"),
+        ({"points": CORNERS.astype(int)}, "'points': its type"),
+        ({"points": CORNERS[:, :2]}, "'points': has shape (4, 2)"),
+        ({"points": np.array(1.0)}, "'points': is damaged"),
+        ({"points": CORNERS * [1, np.nan, 1]}, "'points': holds nan"),
         ({"points": CORNERS * [1, 1, -1]}, "no positive volume"),
         ({"points": CORNERS * [1, 1, 0]}, "no positive volume"),
-        ({"points": CORNERS * 1e200}, "no positive volume"),
-        ({"tetrahedra": np.array([[0, 1, 2, 4]])}, "none of the 4 points"),
-        ({"facets": np.array([[0, 1, 2], [1, 2, -3]])}, "none of the 4 points"),
-        ({"facets": np.array([[0.0, 1, 2], [1, 2, 3]])}, "facets is float64"),
-        ({"facets": np.zeros((0, 3), int), "facet_tags": np.zeros(0, int)}, "facets is int64 (0, 3)"),
-        ({"facet_tags": np.array([tags.BASE])}, "2 facets have 1 tags"),
-        ({"facet_tags": np.array([tags.BASE, 99])}, "facets have a tag"),
-        ({"tetrahedron_tags": np.array([tags.BASE])}, "tetrahedra have a tag"),
-        ({"tetrahedron_tags": np.array([{}], object)}, "not a mesh"),
-        ({"tetrahedron_tags": None}, "not a mesh"),
+        ({"points": CORNERS * 1e200}, "'points': holds 1e+200"),
+        ({"tetrahedra": np.array([[0, 1, 2, 4]])}, "'tetrahedra': holds 4"),
+        ({"tetrahedra": np.zeros((0, 4), int), "tetrahedron_tags": np.zeros(0, int)}, "no positive volume"),
+        ({"facets": np.array([[0, 1, 2], [1, 2, -3]])}, "'facets': holds -3"),
+        ({"facets": np.array([[0.0, 1, 2], [1, 2, 3]])}, "'facets': its type"),
+        ({"facet_tags": np.array([tags.BASE])}, "'facet_tags': has shape (1,)"),
+        ({"facet_tags": np.array([tags.BASE, 99])}, "'facet_tags': holds 99"),
+        ({"tetrahedron_tags": np.array([tags.BASE])}, "'tetrahedron_tags': holds 13"),
+        ({"tetrahedron_tags": np.array([{}], object)}, "'tetrahedron_tags': its type"),
+        ({"tetrahedron_tags": None}, "'tetrahedron_tags': is missing"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -54,7 +54,7 @@ def test_what_makes_no_mesh_is_refused(changes, message, tmp_path):
     with pytest.raises(InputError) as refused:
         read_mesh(path)
     text = str(refused.value)
-    assert text.startswith(str(path)) and message in text and "make it again" in text and "\n" not in text
+    assert text.startswith(str(path)) and message in text and "\n" not in text
 
 
 def test_a_script_is_no_mesh(tmp_path):
