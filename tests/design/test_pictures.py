@@ -122,9 +122,8 @@ def test_design_picture(tmp_path):
     from pneunet.design.design import Design
 
     make_run(tmp_path, solve=False)
-    for picture in ("with.png", "without.png"):
-        assert Design.read(tmp_path).draw(tmp_path / picture)
-        assert (tmp_path / picture).stat().st_size > 20_000
+    for folder in ("with", "without"):
+        assert (Design.read(tmp_path).save(tmp_path / folder) / "design.png").stat().st_size > 20_000
         (tmp_path / "target.csv").unlink(missing_ok=True)
 
 
