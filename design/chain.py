@@ -35,12 +35,13 @@ def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
     InputError or ConvergenceError with what the command said where it ends with exit code 2, RuntimeError
     where it ends otherwise. An interrupt is passed on, and the command ends as it does from a terminal.
     """
-    program = [sys.executable, "-m", "pneunet", *arguments]
+    program = [sys.executable, "-P", "-m", "pneunet", *arguments]
     if ranks > 1:
-        program = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), *arguments]
+        program[4:4] = ["run", "-n", str(ranks)]
     with (
         tempfile.TemporaryFile("w+") as told,
-        subprocess.Popen(program, stdout=subprocess.PIPE, stderr=told, text=True) as process,
+        # a group of its own: a terminal's interrupt is handed on, not told twice
+        subprocess.Popen(program, stdout=subprocess.PIPE, stderr=told, text=True, process_group=0) as process,
     ):
         assert process.stdout is not None
         try:
@@ -105,10 +106,11 @@ def solve_cell(
 
 
 def _run_cell(tables: dict, directory: str | Path) -> Results:
-    from pneunet.base.files.atomic import output_directory, write_text
+    from pneunet.base.files.atomic import write_text
+    from pneunet.base.files.folder import output_folder
 
-    folder = output_directory(directory)
-    write_text(folder / "cell.toml", toml_text(tables))
+    with output_folder(directory) as folder:
+        write_text(folder / "cell.toml", toml_text(tables))
     run_command(["cell", str(folder / "cell.toml")])
     return read_run(folder)
 

@@ -12,7 +12,8 @@ import numpy as np
 import scipy
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import output_directory, write_csv
+from pneunet.base.files.atomic import write_csv
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, TARGET
 from pneunet.base.strains import RodStrains
@@ -126,9 +127,15 @@ class Design:
         return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)
 
     def save(self, directory: str | Path) -> Path:
+        """`write` to a folder, which is made if need be; the folder. InputError where a run is at work in
+        it."""
+        with output_folder(directory) as folder:
+            self.write(folder)
+        return folder
+
+    def write(self, directory: Path) -> None:
         """Write design.toml, centreline.csv, run.json, with a target target.csv and with matplotlib
-        design.png; the folder."""
-        directory = output_directory(directory)
+        design.png."""
         content, line = self.content, self.prediction
         if self.target is not None:
             write_csv(directory / "target.csv", TARGET, self.target.points)
@@ -140,7 +147,6 @@ class Design:
         record = {"inputs": inputs, "versions": versions, "doubts": list(self.doubts)}
         write_record(directory, **{**self.effort, **record})
         self.draw(directory / "design.png")
-        return directory
 
     def plot(self) -> "Figure":
         """A matplotlib figure of target and prediction, with errors and segments."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import require_writable
+from pneunet.base.files.folder import output_folder
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.design import Design, chosen_law
@@ -99,9 +99,9 @@ def run_design(
     Nothing is written before the design is found.
     """
     target = Target.read(target)
-    require_writable(directory)
-    design = inverse_design(target, law=law, objective=objective, outside=outside)
-    design.save(directory)
+    with output_folder(directory) as folder:
+        design = inverse_design(target, law=law, objective=objective, outside=outside)
+        design.write(folder)
     for text in summary(design):
         log.info(text)
     return design

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError, located
-from pneunet.base.files.atomic import atomic_path, output_directory, write_text
+from pneunet.base.files.atomic import atomic_path, write_text
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
@@ -36,13 +37,18 @@ def run_fit(
     than this engineering strain. With "all" the least error without instability is chosen.
     """
     path = Path(path)
+    with output_folder(directory or Path("out") / f"fit-{path.stem}") as folder:
+        return _fit(path, law, folder, stress_unit, largest_strain)
+
+
+def _fit(path, law, directory, stress_unit, largest_strain):
+    """The chosen Fit of `run_fit`."""
     names = {name.lower(): name for name in LAWS}
     if law.lower() not in (*names, "all"):
         raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
     specimens = read_tensile(path, stress_unit)
     with located(path):
         tests = TensileData(specimens, largest_strain)
-    directory = output_directory(directory or Path("out") / f"fit-{path.stem}")
     elongation = min(float(s.stretch[-1]) for s in specimens) - 1
     common = {
         "elongation_at_break": elongation,
