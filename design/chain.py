@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import ConvergenceError, InputError
-from pneunet.base.files.atomic import output_directory, write_text
+from pneunet.base.files.atomic import write_text
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.results import Results, read_run
 from pneunet.base.files.toml import toml_text
 from pneunet.base.units import in_MPa
@@ -32,12 +33,13 @@ def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
     InputError or ConvergenceError with what the command said where it ends with exit code 2, RuntimeError
     where it ends otherwise. An interrupt is passed on, and the command ends as it does from a terminal.
     """
-    program = [sys.executable, "-m", "pneunet", *arguments]
+    program = [sys.executable, "-P", "-m", "pneunet", *arguments]
     if ranks > 1:
-        program = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), *arguments]
+        program[4:4] = ["run", "-n", str(ranks)]
     with (
         tempfile.TemporaryFile("w+") as told,
-        subprocess.Popen(program, stdout=subprocess.PIPE, stderr=told, text=True) as process,
+        # a group of its own: a terminal's interrupt is handed on, not told twice
+        subprocess.Popen(program, stdout=subprocess.PIPE, stderr=told, text=True, process_group=0) as process,
     ):
         assert process.stdout is not None
         try:
@@ -99,8 +101,8 @@ def solve_cell(
     from pneunet.hifi.cell.file import CellCase, cell_tables
 
     case = CellCase(segment, in_MPa(pressure_kPa), mesh_size_mm, levels, contact=contact)
-    folder = output_directory(directory)
-    write_text(folder / "cell.toml", toml_text(cell_tables(case)))
+    with output_folder(directory) as folder:
+        write_text(folder / "cell.toml", toml_text(cell_tables(case)))
     run_command(["cell", str(folder / "cell.toml")])
     return read_run(folder)
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 import scipy
 
-from pneunet.base.files.atomic import output_directory, write_csv
+from pneunet.base.files.atomic import write_csv
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
@@ -144,11 +145,17 @@ class Design:
         return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)
 
     def save(self, directory: str | Path) -> Path:
+        """`write` to a folder, which is made if need be; the folder. InputError where a run is at work in
+        it."""
+        with output_folder(directory) as folder:
+            self.write(folder)
+        return folder
+
+    def write(self, directory: Path) -> None:
         """Write design.toml, centreline.csv, run.json, with a target target.csv and with matplotlib
-        design.png; the folder. InputError where it cannot be written to."""
+        design.png. InputError where it cannot be written to."""
         from pneunet.base.pictures import rendering
 
-        directory = output_directory(directory)
         content, line = self.content, self.prediction
         if self.target is not None:
             write_csv(directory / "target.csv", POINT, self.target.points)
@@ -163,7 +170,6 @@ class Design:
             rendering.save(self.plot(), directory / "design.png")
         except ImportError:
             log.info("no picture: matplotlib is missing, install it with: pip install 'pneunet[pictures]'")
-        return directory
 
     def plot(self) -> "Figure":
         """A matplotlib figure of target and prediction, with errors and segments."""

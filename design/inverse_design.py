@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import require_writable
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.schemas import STRAINS
 from pneunet.base.strains import RodStrains
 from pneunet.design.design import Design, chosen_law
@@ -100,9 +100,9 @@ def run_design(
     Nothing is written before the design is found. InputError and ConvergenceError as for inverse_design.
     """
     wanted = Target.read(target)
-    require_writable(directory)
-    design = inverse_design(wanted, law=law, objective=objective, outside=outside)
-    design.save(directory)
+    with output_folder(directory) as folder:
+        design = inverse_design(wanted, law=law, objective=objective, outside=outside)
+        design.write(folder)
     for text in summary(design):
         log.info(text)
     return design

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import ConvergenceError, InputError
-from pneunet.base.files.atomic import atomic_path, output_directory, write_csv
+from pneunet.base.files.atomic import atomic_path, write_csv
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import SHAPES
 from pneunet.base.units import in_MPa
@@ -50,7 +51,13 @@ def run_shape(
         raise InputError("--pressure-kPa: give at least one pressure")
     doubted = doubts(design.manipulator, [in_MPa(p) for p in pressures_kPa], design.law)
     tell_doubts(doubted, design.law, outside)
-    folder = output_directory(Path(directory) / "shape")
+    with output_folder(Path(directory) / "shape") as folder:
+        _write(folder, design_path, design, pressures_kPa, doubted)
+    return folder
+
+
+def _write(folder, design_path, design, pressures_kPa, doubted):
+    """The files of `run_shape`."""
     shapes: dict[float, Centreline] = {}
     failed: dict[float, str] = {}
     for p in sorted(set(pressures_kPa)):
@@ -86,7 +93,6 @@ def run_shape(
         raise ConvergenceError(
             f"no shape at {_list(failed)} kPa ({failed[first]}); kept in {folder}: {_list(shapes)} kPa"
         )
-    return folder
 
 
 def _list(pressures):

@@ -1,21 +1,21 @@
 """The command line: each command is one call of a function that Python has too.
 
-Exit codes: 0 done; 2 bad input, a load that could not be reached or too little memory (one line on standard
-error, under MPI from one rank); anything else is a bug and shows its traceback.
+Exit codes: 0 done; 2 bad input, a load that could not be reached or too little memory; 130 interrupted (each
+with one line on standard error, under MPI from one rank); anything else is a bug and shows its traceback.
 """
 
 import os
 import sys
-import time
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
 from pneunet.arguments import parser
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.system.interrupts import interruptible, leave
 from pneunet.base.system.launch import rank_map
 from pneunet.base.system.libraries import told_what_to_install
-from pneunet.base.system.log import is_rank_0, show_on_screen
+from pneunet.base.system.log import complain, show_on_screen
 from pneunet.base.units import MPA_PER_KPA
 
 
@@ -99,10 +99,6 @@ def fit_material(a: Namespace) -> None:
 def run(a: Namespace) -> int:
     from pneunet.base.system import launch
 
-    if a.ranks < 1:
-        raise InputError(f"-n {a.ranks}: at least 1 rank is needed")
-    if not a.rest:
-        raise InputError("run: no command given; write for instance: pneunet run -n 2 solve DESIGN.toml")
     return launch.run(a.ranks, a.rest)
 
 
@@ -134,19 +130,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     show_on_screen()
     grammar = parser(COMMANDS)
     try:
-        a = grammar.parse_args(arguments)
-        with told_what_to_install():
+        with interruptible() as told, told_what_to_install():
+            a = grammar.parse_args(arguments)
             return a.function(a) or 0
     except (InputError, ConvergenceError, MemoryError) as error:
-        # every rank fails alike; one of them says so, and the others leave later: mpirun ends a job, and with
-        # it what rank 0 still has to say, at the first failure
-        if is_rank_0():
-            print(f"pneunet: {error}", file=sys.stderr, flush=True)
-        else:
-            time.sleep(1.0)
+        complain(error)
         return 2
-    except KeyboardInterrupt:
-        return 130
     except BrokenPipeError:  # `pneunet ... | head`: nobody reads on
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+    except BaseException as error:
+        if not told and not isinstance(error, KeyboardInterrupt):
+            raise
+        return leave(error)

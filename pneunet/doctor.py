@@ -92,13 +92,13 @@ DRAW = (
 RANKS = """import sys
 from pneunet.base.system import launch
 code = "from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)"
-sys.exit(launch.run(2, ["--", sys.executable, "-c", code]))
+sys.exit(launch.run(2, ["--", sys.executable, "-P", "-c", code]))
 """
 
 
 def probe(code: str, **env: str) -> tuple[bool, str]:
     """Run Python code apart; (True, what it printed) or (False, the last line of what went wrong)."""
-    command = [sys.executable, "-c", code]
+    command = [sys.executable, "-P", "-c", code]
     try:
         done = subprocess.run(
             command,

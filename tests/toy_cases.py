@@ -83,6 +83,7 @@ def initialises_mpi(inputs, directory):
 def main(directory, which, *options):
     from mpi4py import MPI
 
+    from pneunet.base.system.interrupts import Interrupted, leave
     from pneunet.base.system.log import show_on_screen
     from pneunet.base.system.processes import Limits
     from pneunet.hifi.runs.cases import Case, run_cases
@@ -100,7 +101,10 @@ def main(directory, which, *options):
         "none": [],
     }[which]
     show_on_screen()
-    records = run_cases(cases, directory, Limits(SECONDS, MEMORY_MB), retry="--retry" in options)
+    try:
+        records = run_cases(cases, directory, Limits(SECONDS, MEMORY_MB), retry="--retry" in options)
+    except Interrupted as error:
+        sys.exit(leave(error))
     if MPI.COMM_WORLD.rank == 0:
         print(json.dumps(records))
 

@@ -3,7 +3,8 @@
 import csv
 import io
 import os
-import tempfile
+import secrets
+import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +19,25 @@ class NotWritten(InputError):
     """A file could not be written: the disk is full, or the folder is not ours."""
 
 
+#: what temporary names begin with, and what a random one is made of: no file of anybody else's looks like it
+MARK, RANDOM = ".pneunet-", "[0-9a-f]" * 8
+
+
+def temporary_beside(path: Path) -> Path:
+    """A temporary name in the folder of `path`, with its ending, which writers choose their format by; makes
+    nothing."""
+    return path.with_name(f"{MARK}{secrets.token_hex(4)}-{path.name[-100:]}")
+
+
+def remove_leftovers(directory: Path) -> None:
+    """Remove the temporary files and folders that runs which were killed have left in `directory`."""
+    for left in directory.glob(f"{MARK}{RANDOM}-*"):
+        if left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
+
+
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """A temporary path beside `path` to write to; renamed onto it when the block ends without an exception.
@@ -30,14 +50,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 @contextmanager
 def _replacing(path):
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    os.close(handle)
+    temporary = temporary_beside(path)
+    temporary.touch(exist_ok=False)  # with the rights that the user's umask leaves
     try:
-        yield Path(temporary)
-        os.chmod(temporary, 0o644)
+        yield temporary
         os.replace(temporary, path)
     finally:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -87,20 +106,6 @@ def read_columns(path: str | Path, columns: Sequence[str]) -> np.ndarray:
     return out
 
 
-def output_directory(path: str | Path) -> Path:
-    """The folder, made if need be; an unwritable one is an InputError before any work is done."""
-    path = Path(path)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written to ({error.strerror}): choose another folder with -o"
-        ) from None
-    return path
-
-
 @contextmanager
 def room_in(directory: str | Path, then: str = "") -> Iterator[None]:
     """Where `directory` is written to while work goes on: a full disk is NotWritten, which says what to do
@@ -112,13 +117,3 @@ def room_in(directory: str | Path, then: str = "") -> Iterator[None]:
     except OSError as error:
         why = error.strerror or error
         raise NotWritten(f"{directory}: cannot be written to ({why}): make room there{then}") from None
-
-
-def require_writable(path: str | Path) -> None:
-    """InputError when `path` could not be made or written to; makes nothing itself, for use before long
-    work."""
-    existing = Path(path).absolute()
-    while not existing.exists():
-        existing = existing.parent
-    if not existing.is_dir() or not os.access(existing, os.W_OK):
-        raise InputError(f"{path}: cannot be written to: choose another folder with -o")

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError, located
-from pneunet.base.files.atomic import atomic_path, output_directory, require_writable, write_text
+from pneunet.base.files.atomic import atomic_path, write_text
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
@@ -42,6 +43,12 @@ def run_fit(
     "all" the least error without instability is chosen.
     """
     path = Path(path)
+    with output_folder(directory or Path("out") / f"fit-{path.stem}") as folder:
+        return _fit(path, law, folder, stress_unit, largest_strain, gauge_length)
+
+
+def _fit(path, law, directory, stress_unit, largest_strain, gauge_length):
+    """The chosen Fit of `run_fit`."""
     names = {name.lower(): name for name in LAWS}
     if law.lower() not in (*names, "all"):
         raise InputError(f"--law {law}: known laws are {', '.join(LAWS)}, or all")
@@ -52,8 +59,6 @@ def run_fit(
     specimens = read_tensile(path, stress_unit, gauge_length)
     with located(path):
         tests = TensileData(specimens, largest_strain)
-    directory = Path(directory or Path("out") / f"fit-{path.stem}")
-    require_writable(directory)
     elongation = min((float(s.stretch[-1]) - 1 for s in specimens if s.broke), default=inf)
     reached = max(float(s.stretch[-1]) for s in specimens) - 1
     common = {
@@ -72,7 +77,6 @@ def run_fit(
     if not shown:
         raise InputError(f"{path}: no usable law comes out ({refused[wanted[0]]})")
     chosen = best(shown)
-    directory = output_directory(directory)
     write_text(directory / "material.toml", toml_text({"material": material_to_table(chosen.material)}))
     credible = [f for f in fits.values() if f is chosen or f.error < CREDIBLE]
     stretch = min(2.0, tests.largest)

@@ -6,7 +6,6 @@ read different variables to be told otherwise. Here they are all told, whichever
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -14,8 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from pneunet.base.errors import InputError
 from pneunet.base.system.doorman import end_with_parent
-from pneunet.base.system.log import RANK_VARIABLES
+from pneunet.base.system.interrupts import EXIT_CODE, HANDED_ON, Handler, handled
+from pneunet.base.system.log import complain, under_launcher
 from pneunet.base.system.processes import environment_without_launcher
 
 # Variables of Open MPI 4 (OMPI_...) and 5 (PRTE_... for its launcher). A value the user has set wins.
@@ -42,6 +43,9 @@ SETTINGS = {
     "OMP_NUM_THREADS": "1",
     "HWLOC_HIDE_ERRORS": "2",
 }
+#: more than this is a slip of the pen, which would bring the machine down
+RANKS_PER_CORE = 64
+HEARING_SECONDS = 0.3
 
 
 def environment() -> dict[str, str]:
@@ -53,44 +57,46 @@ def environment() -> dict[str, str]:
 
 
 def command_line(ranks: int, command: list[str]) -> list[str]:
-    """The mpirun line. A command that starts with "--" is any program, else a sub-command of pneunet."""
-    if ranks < 1:
-        raise ValueError(f"the number of ranks must be at least 1, not {ranks}")
+    """The mpirun line. A command that starts with "--" is any program, else a sub-command of pneunet.
+
+    InputError where it makes no sense.
+    """
+    most = RANKS_PER_CORE * (os.cpu_count() or 1)
+    if not 1 <= ranks <= most:
+        raise InputError(f"run: -n {ranks}: the number of ranks must be at least 1, and at most {most} here")
     program = (
         command[1:] if command[:1] == ["--"] else [str(Path(sys.executable).with_name("pneunet")), *command]
     )
     if not program or not command:
-        raise ValueError(
-            "no command to run: pneunet run -n 2 solve DESIGN.toml, or pneunet run -n 2 -- PROGRAM ..."
+        raise InputError(
+            "run: no command given: pneunet run -n 2 solve DESIGN.toml, or pneunet run -n 2 -- PROGRAM ..."
         )
     return ["mpirun", "-n", str(ranks), *program]
 
 
 def run(ranks: int, command: list[str]) -> int:
-    """Run `command` on `ranks` ranks, with our standard streams; returns its exit code."""
-    try:
-        line = command_line(ranks, command)
-    except ValueError as error:
-        print(f"pneunet run: {error}", file=sys.stderr)
-        return 2
+    """Run `command` on `ranks` ranks, with our standard streams; returns its exit code.
+
+    Interrupted, we hand that on to the ranks, which end in order; a second signal ends them at once.
+    """
+    line = command_line(ranks, command)
     env = environment()
     for needed in ("mpirun", line[3]):
         if shutil.which(needed, path=env["PATH"]) is None:
-            print(f"pneunet run: {needed} not found (make setup; pneunet doctor tells more)", file=sys.stderr)
-            return 127
-    # killed ourselves, even by SIGKILL, we leave no ranks behind that would write into the next run's results
-    with subprocess.Popen(
-        line, env=env, preexec_fn=end_with_parent if os.name == "posix" else None
-    ) as process:
-        # Told to end, we tell mpirun, so that no rank is left behind.
-        previous = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
-        try:
-            code = process.wait()
-        except KeyboardInterrupt:  # mpirun got it too, from the terminal
-            code = process.wait() or 130
-        finally:
-            signal.signal(signal.SIGTERM, previous)
+            raise InputError(f"run: {needed} not found (make setup; pneunet doctor tells more)")
+    # killed ourselves, even by SIGKILL, we leave no ranks behind that would write into the next run's
+    # results; a group of its own, since mpirun, told by the terminal too, gives its ranks no time
+    with subprocess.Popen(line, env=env, preexec_fn=end_with_parent, process_group=0) as process:
+        told = Handler(process.terminate)
+        with handled(told):
+            while (code := _wait(process)) is None:
+                if told.first:  # again and again: mpirun hears nothing while it starts
+                    process.send_signal(HANDED_ON)
     code = code if code >= 0 else 128 - code
+    if told.first and code:
+        if code != EXIT_CODE:  # the ranks have not said so themselves
+            complain("interrupted")
+        return EXIT_CODE
     if 128 < code < 160:  # said here, since mpirun is told to be quiet
         why = " (out of memory?)" if code == 137 else ""
         resume = (
@@ -98,8 +104,16 @@ def run(ranks: int, command: list[str]) -> int:
             if "solve" in command
             else ""
         )
-        print(f"pneunet run: a rank was stopped by signal {code - 128}{why}{resume}", file=sys.stderr)
+        complain(f"run: a rank was stopped by signal {code - 128}{why}{resume}")
     return code
+
+
+def _wait(process):
+    """The exit code, None when it is still at work after a moment."""
+    try:
+        return process.wait(HEARING_SECONDS)
+    except subprocess.TimeoutExpired:
+        return None
 
 
 @contextmanager
@@ -110,7 +124,7 @@ def rank_map() -> Iterator[Callable | None]:
     On ranks other than 0 it is None: they have done the work by the time the block is entered. Rank 0 hands
     out and computes nothing itself.
     """
-    if not any(name in os.environ for name in RANK_VARIABLES):
+    if not under_launcher():
         yield map
         return
     from mpi4py import MPI

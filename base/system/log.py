@@ -7,6 +7,7 @@ it, as the command line does. Under MPI rank 0 speaks for all.
 import logging
 import os
 import sys
+import time
 
 #: what MPI launchers tell a process of its rank
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
@@ -17,11 +18,39 @@ def is_rank_0() -> bool:
     return all(os.environ.get(name, "0") == "0" for name in RANK_VARIABLES)
 
 
+#: characters of one message on the screen; of longer ones the end is kept too, where the fix stands
+MOST, KEPT_AT_END = 1000, 300
+
+
+def printable(text: object) -> str:
+    """A message as one line that a terminal can be given, whatever names and files are told in it: control
+    characters are spelled out, too long a text is cut."""
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text))
+    return line if len(line) <= MOST else f"{line[: MOST - KEPT_AT_END]} ... {line[-KEPT_AT_END:]}"
+
+
+def complain(text: object) -> None:
+    """Say on standard error why the program ends; from rank 0 alone.
+
+    The others leave later: mpirun ends a job, and with it what rank 0 still has to say, at the first failure.
+    """
+    if is_rank_0():
+        print(f"pneunet: {printable(text)}", file=sys.stderr, flush=True)
+    else:
+        time.sleep(1.0)
+
+
+def under_launcher() -> bool:
+    """Whether an MPI launcher has started this process."""
+    return any(name in os.environ for name in RANK_VARIABLES)
+
+
 class _Screen(logging.Handler):
     """Messages as plain lines on standard output, whatever that is at the time."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(self.format(record), file=sys.stdout, flush=True)  # a closed pipe is the caller's to hear of
+        # a closed pipe is the caller's to hear of
+        print(printable(self.format(record)), file=sys.stdout, flush=True)
 
 
 def show_on_screen() -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pneunet.base.quantities import Checked, quantity
+from pneunet.base.system.interrupts import Interrupted, is_interrupted
 
 #: variables by which MPI launchers (Open MPI 4 and 5, MPICH, SLURM's PMI) tell a process that it is one of
 #: their ranks
@@ -79,6 +80,8 @@ def run_limited(
         )
     try:
         while not (ended := os.wait4(child.pid, os.WNOHANG))[0]:
+            if is_interrupted():
+                raise Interrupted
             if not out_of_time and time.monotonic() > deadline:
                 out_of_time = True
                 _kill_group(child.pid)

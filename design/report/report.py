@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.files.atomic import output_directory, write_text
+from pneunet.base.files.atomic import write_text
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import revision
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report import figures
@@ -64,7 +65,12 @@ def write_report(directory: str | Path, law: SegmentLaw | None = None) -> Path:
     """
     run = read_design_folder(directory)
     law = choose_law(run.law) if law is None else law
-    folder = output_directory(run.directory / "report")
+    with output_folder(run.directory), output_folder(run.directory / "report") as folder:
+        return _write(run, law, folder)
+
+
+def _write(run, law, folder):
+    """The path of the page."""
     comparison = Comparison.of(run, law)
     draw_drawing(run.design, folder / "drawing.png")
     sections = [

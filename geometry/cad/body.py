@@ -13,6 +13,7 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.system.interrupts import at_once
 from pneunet.geometry import tags
 from pneunet.geometry.parameters import Manipulator, Segment
 
@@ -26,7 +27,8 @@ def session(name: str = "pneunet") -> Iterator[Any]:
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.add(name)
-        yield gmsh.model
+        with at_once():
+            yield gmsh.model
     finally:
         gmsh.finalize()
 

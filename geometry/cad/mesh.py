@@ -11,7 +11,8 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import atomic_path, output_directory, write_text
+from pneunet.base.files.atomic import atomic_path, write_text
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.toml import to_table
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
@@ -29,8 +30,8 @@ def mesh_design(path: str | Path, directory: str | Path, mesh_size: float | None
     The answer of `mesh_manipulator`, which raises what this raises.
     """
     content = read_design_file(path)
-    folder = output_directory(directory) / "mesh"
-    facts = mesh_manipulator(content.manipulator, mesh_size or content.mesh_size, folder)
+    with output_folder(Path(directory) / "mesh") as folder:
+        facts = mesh_manipulator(content.manipulator, mesh_size or content.mesh_size, folder)
     log.info(f"written: {folder / MESH}, manipulator.msh, manipulator.step, mesh.json")
     return facts
 

@@ -110,6 +110,8 @@ class ManipulatorSolve:
         self.stretch = PrincipalStretch(self.problem)
         #: hifi.path.stepping.Step of the last accepted state
         self.last_step = None
+        #: called between iterations (hifi.path.newton)
+        self.between: Callable[[], object] = lambda: None
         self.stability_factorisations, self.rest_volume, self.path = 0, self.system.volume(), None
         self.begin(DEAD_LOADS if self.dead else "pressure")
 
@@ -237,6 +239,7 @@ class ManipulatorSolve:
             on_measured(self.measure(step, count))
 
         limit()
+        self.path.newton.between = self.between
         return run_steps(self.path, target, size, on_step, before)
 
     def _turn_per_parameter(self, first, second):

@@ -60,6 +60,8 @@ class Newton:
         self.options = options or NewtonOptions()
         self.current = False  # whether there is a factorisation to lag
         self.factorised_at = None  # (state, load) of that factorisation
+        #: called before every iteration, on all ranks at the same; what it raises ends the way
+        self.between: Callable[[], object] = lambda: None
         self.timings = {"residual": 0.0, "factorise": 0.0, "renew": 0.0, "solve": 0.0}
 
     def timed(self, name: str, function: Callable, *arguments: Any) -> Any:
@@ -88,6 +90,7 @@ class Newton:
         since, fresh = [norm], False
         factorised, due = 0, False  # tangents so far; whether walls that touch ask for the next
         for iteration in range(o.maximum_iterations + 1):
+            self.between()
             tolerance = o.relative_tolerance * scale + o.absolute_tolerance
             if norm <= tolerance and control.satisfied(system, parameter):
                 return NewtonResult(iteration, history)

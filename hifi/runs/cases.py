@@ -8,7 +8,6 @@ moment goes on where it was. A case that raises, crashes, hangs or eats memory i
 stops nothing. Ranks get cases from mpi4py.futures; its manager takes rank 0.
 """
 
-import fcntl
 import hashlib
 import json
 import logging
@@ -17,10 +16,8 @@ import shutil
 import signal
 import socket
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -29,12 +26,13 @@ from typing import Any
 from mpi4py import MPI
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import output_directory, write_text
+from pneunet.base.files.atomic import temporary_beside, write_text
 from pneunet.base.files.reading import read_json
 from pneunet.base.files.record import revision
 from pneunet.base.files.toml import as_table, from_table
+from pneunet.base.system.interrupts import Interrupted, deferred, is_interrupted
 from pneunet.base.system.processes import Limits, environment_without_launcher, machine_memory_MB, run_limited
-from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.fem.agreement import folder_of_all, on_rank_0
 from pneunet.hifi.runs.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
 
 log = logging.getLogger(__name__)
@@ -46,7 +44,6 @@ STATUSES = (*ANSWERS, ERROR, CRASHED, OUT_OF_TIME, MEMORY)
 RECORD = "record.json"
 #: of the machine's memory, shared by the workers on it when no limit is given
 MEMORY_SHARE = 0.9
-LOCK_SECONDS = 5
 
 
 def case_limits(tables: dict, where: str) -> Limits:
@@ -96,7 +93,7 @@ def run_cases(
     directory = Path(directory)
     limits = _with_memory(limits or Limits(), comm)
     records, failure = {}, None
-    with _locked(comm, directory):
+    with deferred(), folder_of_all(comm, directory):
         todo = on_rank_0(comm, lambda: _unfinished(cases, directory, retry, records, on_record))
         work = partial(
             run_case,
@@ -108,13 +105,17 @@ def run_cases(
 
         def take(finished):
             for case, record in finished:
-                records[case.name] = record
-                progress.tell(case, record)
-                on_record(case, record)
+                if record:
+                    records[case.name] = record
+                    progress.tell(case, record)
+                    on_record(case, record)
+                if not record or is_interrupted():
+                    there = f"{len(records)} of {len({case.name for case in cases})} cases are finished"
+                    raise Interrupted(f"interrupted: {there} in {directory}; the same command goes on")
 
         try:
             _distribute(work, todo, comm, take)
-        except Exception as error:
+        except (Exception, Interrupted) as error:
             failure = error
         failure = comm.bcast(failure, root=0)
     if failure is not None:
@@ -140,12 +141,12 @@ def _distribute(work, todo, comm, take):
 
 def run_case(
     case: Case, directory: Path, limits: Limits, version: str = "unknown"
-) -> tuple[Case, dict[str, Any]]:
-    """(case, record) of one case, run in a child process; directory/NAME is there, complete, when it
-    returns."""
-    started = time.time()
+) -> tuple[Case, dict[str, Any] | None]:
+    """(case, record) of one case, run in a child process; directory/NAME is there, complete, when it returns;
+    without a record when it was interrupted."""
+    started, folder = time.time(), temporary_beside(directory / case.name)
     try:
-        folder = Path(tempfile.mkdtemp(dir=directory, prefix=f".{case.name}-"))
+        folder.mkdir()
         record = _run_in(folder, case, limits)
         record |= {
             "limits": asdict(limits),
@@ -156,8 +157,10 @@ def run_case(
         write_text(folder / RECORD, json.dumps(record, indent=1) + "\n")
         # of a run that did not end by itself, or left no record
         shutil.rmtree(directory / case.name, ignore_errors=True)
-        os.chmod(folder, 0o755)
         os.rename(folder, directory / case.name)
+    except Interrupted:
+        shutil.rmtree(folder, ignore_errors=True)
+        return case, None
     except OSError as error:  # nothing is on disk: the next run computes it again
         reason = f"could not be started or recorded ({error})"
         record = _record(
@@ -183,7 +186,7 @@ def _run_in(folder, case, limits):
     )
     environment = {"OMP_NUM_THREADS": "1"} | environment_without_launcher()
     program = "pneunet.hifi.runs.case_process"
-    command = [sys.executable, "-X", "faulthandler", "-m", program, str(folder.resolve())]
+    command = [sys.executable, "-P", "-X", "faulthandler", "-m", program, str(folder.resolve())]
     ended = run_limited(command, limits, folder / "log.txt", environment, folder)
     try:
         answer = json.loads((folder / "answer.json").read_text())
@@ -224,8 +227,6 @@ def finished(case: Case, directory: str | Path) -> dict[str, Any] | None:
 
 def _unfinished(cases, directory, retry, records, on_record):
     """The cases to compute, each once; those on disk go to `records`."""
-    for left in directory.glob(".*-*"):
-        shutil.rmtree(left, ignore_errors=True)  # half a case of a run that was killed
     distinct = {case.name: case for case in cases}
     for name, case in distinct.items():
         record = finished(case, directory)
@@ -249,33 +250,6 @@ def _with_memory(limits, comm):
     share = comm.allreduce(MEMORY_SHARE * machine_memory_MB() / max(machine.size - idle, 1), op=MPI.MIN)
     machine.Free()
     return limits if limits.memory_MB else replace(limits, memory_MB=share)
-
-
-@contextmanager
-def _locked(comm, directory):
-    """The folder, made if need be, for this run alone: rank 0 holds a lock that falls with it, however it
-    ends."""
-
-    def lock():
-        stream = open(output_directory(directory) / "lock", "w")
-        for _ in range(10 * LOCK_SECONDS):  # a run that is just being killed needs a moment
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                held.append(stream)
-                return
-            except BlockingIOError:
-                time.sleep(0.1)
-        raise InputError(
-            f"{directory}: another run is at work in it: wait for that, or choose another folder with -o"
-        )
-
-    held = []
-    on_rank_0(comm, lock)
-    try:
-        yield
-    finally:
-        for stream in held:
-            stream.close()
 
 
 class _Progress:

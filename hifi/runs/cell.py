@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import ConvergenceError
-from pneunet.base.files.atomic import output_directory, write_csv
+from pneunet.base.files.atomic import write_csv
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CELL
 from pneunet.base.files.toml import to_table
@@ -30,7 +31,12 @@ def run_cell(path: str | Path, directory: str | Path) -> None:
     InputError on bad input; ConvergenceError, with what was reached in cell.csv, when the path ends short.
     """
     case = read_cell(path)
-    out = output_directory(directory) / "cell"
+    with output_folder(Path(directory) / "cell") as out:
+        _solve(case, out)
+
+
+def _solve(case, out):
+    """The files of `run_cell`."""
     limit_points: list[LimitPoint] = []
     states: list[CellState] = []
     touched: list[float] = []

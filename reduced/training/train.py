@@ -18,6 +18,7 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.dataset import CellData, read_dataset
+from pneunet.base.files.folder import output_folder
 from pneunet.reduced.trained.file import read_law, write_law
 from pneunet.reduced.trained.law import KindLaw, TrainedLaw
 from pneunet.reduced.training.comparing import compare_laws, curve_table, law_table, learning_curve
@@ -70,6 +71,12 @@ def run_training(
     mapping: a `map`, over processes for instance; what it computes side by side does not depend on how many
     there are. like: file of a law whose metrics and noises are taken as they are.
     """
+    with output_folder(Path(out).parent):
+        return _train(path, out, compare, mapping, like)
+
+
+def _train(path, out, compare, mapping, like):
+    """The law of `run_training`."""
     data, started = read_dataset(path), time.perf_counter()
     known, about = (read_law(like).kinds, {"like_sha256": digest(like)}) if like else ({}, {})
     try:

@@ -1,18 +1,20 @@
 """Files are whole or not there."""
 
+import os
+
 import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import (
     atomic_path,
-    output_directory,
     read_columns,
     read_csv,
-    require_writable,
+    temporary_beside,
     write_csv,
     write_text,
 )
+from pneunet.base.files.folder import output_folder
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -34,7 +36,16 @@ def test_readers_see_the_old_file_until_the_new_one_is_whole(tmp_path):
         temporary.write_text("new")
     assert path.read_text() == "new"
     assert [p.name for p in path.parent.iterdir()] == ["file.txt"]
-    assert path.stat().st_mode & 0o777 == 0o644
+
+
+@pytest.mark.parametrize(("umask", "rights"), [(0o022, 0o644), (0o077, 0o600), (0o002, 0o664)])
+def test_files_have_the_rights_that_the_user_gives(tmp_path, umask, rights):
+    before = os.umask(umask)
+    try:
+        write_text(tmp_path / "file", "")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == rights
 
 
 def test_csv_reads_back_to_twelve_digits(tmp_path):
@@ -69,16 +80,44 @@ def test_csv_that_cannot_be_used_is_named(tmp_path, content, message):
     assert str(error.value).startswith(str(path))
 
 
-def test_a_folder_that_cannot_be_made_is_bad_input(tmp_path):
-    assert output_directory(tmp_path / "a b" / "c").is_dir()
+def test_a_folder_that_cannot_be_made_is_bad_input_and_an_empty_one_goes_again(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written to .*-o"):
-        output_directory(tmp_path / "file" / "folder")
+        with output_folder(tmp_path / "file" / "folder"):
+            pass
+    with output_folder(tmp_path / "a b" / "c") as folder:
+        assert folder.is_dir()
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
-def test_a_folder_that_cannot_be_made_is_refused_before_long_work(tmp_path):
-    (tmp_path / "file").write_text("")
-    require_writable(tmp_path / "not" / "yet")
-    assert not (tmp_path / "not").exists()
-    with pytest.raises(InputError, match="choose another folder"):
-        require_writable(tmp_path / "file" / "below")
+def test_one_run_works_in_a_folder_at_a_time(tmp_path, monkeypatch):
+    monkeypatch.setattr("pneunet.base.files.folder.PATIENCE_SECONDS", 0.0)
+    with output_folder(tmp_path / "out") as folder:
+        with pytest.raises(InputError, match=f"{folder}: another run is at work"):
+            with output_folder(folder):
+                pass
+        (folder / "result").touch()
+    with output_folder(folder):
+        pass
+    assert [p.name for p in folder.iterdir()] == ["result"]
+
+
+def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
+    (tmp_path / "mine").write_text("precious")
+    (tmp_path / ".lock").symlink_to("mine")
+    with pytest.raises(InputError, match="cannot be written to"):
+        with output_folder(tmp_path):
+            pass
+    assert (tmp_path / "mine").read_text() == "precious"
+
+
+def test_what_killed_runs_left_goes_and_nothing_of_anybody_else(tmp_path):
+    ours = [temporary_beside(tmp_path / name) for name in ("design.png", "a-case")]
+    ours[0].touch()
+    ours[1].mkdir()
+    theirs = [tmp_path / name for name in (".design-abcd1234.png", ".pneunet-notes-a.md", ".pneunet-1234")]
+    for path in [*theirs, ours[1] / "log.txt"]:
+        path.touch()
+    with output_folder(tmp_path):
+        assert sorted(tmp_path.iterdir()) == sorted([*theirs, tmp_path / ".lock"])
+    assert sorted(tmp_path.iterdir()) == sorted(theirs)

@@ -85,6 +85,24 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path, ranks):
     assert not list(directory.glob(".*-*"))
 
 
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_an_interrupted_run_ends_in_order_and_the_next_goes_on(tmp_path, ranks):
+    directory = tmp_path / "cases"
+    line = [*command(ranks, directory, "naps")]
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    deadline = time.monotonic() + 60
+    while len(list(directory.glob("[!.]*/record.json"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[1]
+    finished = len(list(directory.glob("*/record.json")))
+    assert process.returncode == 130 and 2 <= finished < 8
+    assert told.splitlines()[-1].startswith(f"pneunet: interrupted: {finished} of 8 cases are finished")
+    assert all(not path.name.startswith(".") for path in directory.iterdir())
+    _, records = run(ranks, directory, "naps")
+    assert {r["status"] for r in records} == {"done"}
+
+
 def test_failures_are_computed_again_when_asked(tmp_path):
     directory = tmp_path / "cases"
     run(1, directory, "failures")
@@ -99,7 +117,7 @@ def test_failures_are_computed_again_when_asked(tmp_path):
 def test_two_runs_do_not_work_in_one_folder(tmp_path):
     process = subprocess.Popen(command(1, tmp_path / "cases", "naps"), stdout=subprocess.DEVNULL, cwd=ROOT)
     try:
-        while not list(tmp_path.glob("cases/.*-*")):
+        while not list(tmp_path.glob("cases/.pneunet-*")):
             time.sleep(0.01)
         process.send_signal(signal.SIGSTOP)  # it holds the lock for as long as it lives
         refused = subprocess.run(

@@ -1,5 +1,6 @@
 """`pneunet run`: ranks, arguments, streams and exit codes, as a user sees them."""
 
+import signal
 import subprocess
 import sys
 import time
@@ -8,16 +9,15 @@ import pytest
 
 from pneunet.base.system import launch
 
+RUN = [sys.executable, "-m", "pneunet", "run", "-n"]
 START = "import sys; from pneunet.base.system import launch; "
 SIZE = "from mpi4py import MPI; c = MPI.COMM_WORLD; s = c.allreduce(c.rank); c.rank or print(c.size, s)"
 
 
 def run(ranks, *command, **options):
-    """launch.run in a process of its own, since it hands its standard streams on."""
-    code = f"import sys; from pneunet.base.system import launch; sys.exit(launch.run({ranks}, sys.argv[1:]))"
-    return subprocess.run(
-        [sys.executable, "-c", code, *command], capture_output=True, text=True, timeout=120, **options
-    )
+    """`pneunet run` in a process of its own, since it hands its standard streams on."""
+    line = [*RUN, str(ranks), *command]
+    return subprocess.run(line, capture_output=True, text=True, timeout=120, **options)
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 5])
@@ -47,15 +47,18 @@ def test_killed_rank_is_reported():
     ("ranks", "command", "message"),
     [
         (0, ["--", "true"], "at least 1"),
+        (1_000_000_000, ["--", "true"], "at most"),
         (2, [], "no command"),
         (2, ["--"], "no command"),
         (2, ["--", "no-such-program"], "no-such-program not found"),
+        (2, ["--", "a\x1b]0;b\x9b\r" + 5000 * "c"], "a\\x1b]0;b\\x9b\\rccc"),
     ],
 )
 def test_mistakes_get_one_line(ranks, command, message):
     done = run(ranks, *command)
-    assert done.returncode in (2, 127)
-    assert message in done.stderr and len(done.stderr.splitlines()) == 1
+    assert done.returncode == 2
+    assert message in done.stderr and len(done.stderr.splitlines()) == 1 and len(done.stderr) < 1100
+    assert done.stderr.strip().isprintable()
 
 
 def test_without_dashes_it_is_a_subcommand_of_pneunet():
@@ -82,17 +85,27 @@ def test_one_thread_a_rank_unless_the_user_says_otherwise(monkeypatch):
     assert launch.environment()["OMP_NUM_THREADS"] == "4"
 
 
-def test_terminating_it_leaves_no_ranks_behind(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupting_it_leaves_no_ranks_behind(tmp_path, number):
     beat = tmp_path / "beat"
     ranks = f"import time\nwhile True: open({str(beat)!r}, 'a').write('x'); time.sleep(0.05)"
-    code = START + f"sys.exit(launch.run(2, ['--', 'python', '-c', {ranks!r}]))"
-    process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
+    line = [*RUN, "2", "--", "python", "-c", ranks]
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60
     while not beat.exists() and time.monotonic() < deadline:
         time.sleep(0.05)
-    process.terminate()
-    assert process.wait(timeout=60) != 0
+    process.send_signal(number)
+    told = process.communicate(timeout=60)[1]
+    assert process.returncode == 130 and told.splitlines()[-1] == "pneunet: interrupted"
     time.sleep(0.5)
     size = beat.stat().st_size
     time.sleep(0.5)
     assert beat.stat().st_size == size > 0
+
+
+def test_the_working_folder_lends_no_modules(tmp_path):
+    for name in ("base", "design", "numpy", "csv"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit(9)")
+    line = [sys.executable, "-m", "pneunet", "fit-material", "none.csv"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and "none.csv: no such file" in done.stderr

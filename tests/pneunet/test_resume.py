@@ -1,6 +1,7 @@
 """`pneunet solve --resume` after real kills, on one and two ranks, and what happens when nothing more can be
 written."""
 
+import json
 import os
 import shutil
 import signal
@@ -164,6 +165,33 @@ def test_a_killed_run_ends_at_the_same_result(whole, killed, tmp_path, ranks):
             < 1e-8 * abs(a["displacement_mm"][last]).max()
         )
     assert readable(folder) == pytest.approx(readable(whole))
+
+
+@pytest.mark.parametrize(
+    ("ranks", "number"), [(1, signal.SIGINT), (1, signal.SIGTERM), (2, signal.SIGINT), (2, signal.SIGTERM)]
+)
+def test_an_interrupted_run_says_where_and_the_next_goes_on(whole, tmp_path, ranks, number):
+    """The signal is the launcher's alone; a second run in the folder is refused meanwhile."""
+    shutil.copytree(whole / "mesh", tmp_path / "mesh")
+    command = [sys.executable, "-m", "pneunet", *SOLVE, "-o", str(tmp_path), "--no-fields"]
+    if ranks > 1:
+        command[3:3] = ["run", "-n", str(ranks)]
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=DATA.parent.parent
+    )
+    deadline = time.monotonic() + 120
+    while reached(tmp_path) < 1 and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(number)
+    told = process.communicate(timeout=60)[1]
+    record = json.loads((tmp_path / "solve" / "run.json").read_text())
+    at = f"interrupted at {record['pressure_reached_kPa']:.3g} kPa"
+    assert process.returncode == 130 and record["status"] == at
+    assert told.splitlines()[-1].startswith(f"pneunet: {at}; the result up to there is in")
+    assert not list((tmp_path / "solve").glob(".*"))
+    step = reached(tmp_path)
+    assert f"resumed after step {step}" in solve(tmp_path, "--resume", "--no-fields").stdout
+    assert reached(tmp_path) == reached(whole)
 
 
 def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):

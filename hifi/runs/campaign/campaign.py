@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from pneunet.base.files.atomic import output_directory, room_in, write_text
+from pneunet.base.files.atomic import room_in, write_text
 from pneunet.base.files.dataset import DIRECTIONS, UPPER, CellData, columns, write_dataset
 from pneunet.base.files.datasheet import datasheet
 from pneunet.base.files.record import revision, write_record
+from pneunet.base.system.interrupts import Interrupted
 from pneunet.geometry.shape_numbers import SHAPE, direction_matrix, normal_pitch, shape_numbers
-from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.fem.agreement import folder_of_all, on_rank_0
 from pneunet.hifi.runs.campaign.case import STATES
 from pneunet.hifi.runs.campaign.extension import Known, taken_over
 from pneunet.hifi.runs.campaign.file import Campaign, read_campaign
@@ -49,7 +50,6 @@ def run_campaign(
     directory, started = Path(directory), time.perf_counter()
     campaign = on_rank_0(comm, lambda: read_campaign(path))
     known = on_rank_0(comm, lambda: taken_over(campaign, extend)) if extend else Known()
-    on_rank_0(comm, lambda: output_directory(directory) and None)
     counts = Counter((d.kind, d.mesh.name) for d in campaign.designs)
     for (kind, mesh), number in counts.items():
         log.info(f"campaign: {number} {kind} designs on mesh '{mesh}'")
@@ -57,8 +57,13 @@ def run_campaign(
     if extend:
         log.info(f"{len(known.cases)} of them are taken over from {extend}")
     cases = [d.case for d in campaign.designs if d.case.name not in known.cases]
-    run_cases(cases, directory / "cases", campaign.limits, comm, gathering.add, retry)
-    return on_rank_0(comm, lambda: gathering.finish(comm.size, time.perf_counter() - started))
+    with folder_of_all(comm, directory):
+        try:
+            run_cases(cases, directory / "cases", campaign.limits, comm, gathering.add, retry)
+        except Interrupted:
+            on_rank_0(comm, lambda: gathering.write() and None)
+            raise
+        return on_rank_0(comm, lambda: gathering.finish(comm.size, time.perf_counter() - started))
 
 
 class Gathering:

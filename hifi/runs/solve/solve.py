@@ -10,16 +10,18 @@ from typing import Protocol
 from mpi4py import MPI
 
 from pneunet.base.errors import ConvergenceError, InputError
-from pneunet.base.files.atomic import output_directory, room_in
+from pneunet.base.files.atomic import room_in
+from pneunet.base.files.folder import output_folder
 from pneunet.base.files.reading import read_json
 from pneunet.base.files.record import read_record
+from pneunet.base.system.interrupts import Interrupted, deferred
 from pneunet.geometry.designfile import DesignFile, body_tables
 from pneunet.geometry.loading import Extras
 from pneunet.geometry.meshfile import MESH, read_mesh
 from pneunet.hifi.body import tip
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.contact.penalty import WallPenalty
-from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.fem.agreement import agreed_interrupt, folder_of_all, on_rank_0
 from pneunet.hifi.path.stepping import StepResult
 from pneunet.hifi.runs.solve.checkpoint import CHECKPOINT, Checkpoint, read_checkpoint, restore
 from pneunet.hifi.runs.solve.fields import FieldWriter
@@ -60,9 +62,15 @@ def solve_design(
     once it is on disk. Returns the last Measured. Raises InputError on bad input and ConvergenceError (with
     everything accepted on disk) when the end asked for cannot be reached.
     """
-    started, directory = time.perf_counter(), Path(directory)
+    directory, size = Path(directory), mesh_size or design.mesh_size
+    with folder_of_all(comm, directory / "solve"):
+        return _solve(design, directory, size, pressure, fields, comm, resume, milestones, observers)
+
+
+def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milestones, observers):
+    started = time.perf_counter()
     mesh_path, out = directory / "mesh" / MESH, directory / "solve"
-    goal, mesh_size = Goal.of(design, pressure), mesh_size or design.mesh_size
+    goal = Goal.of(design, pressure)
     identity = {
         "body": body_tables(design.manipulator),
         "mesh_size_mm": mesh_size,
@@ -133,14 +141,16 @@ def solve_design(
 def _walk(solve, goal, told, record, milestones, before):
     """StepResult of the way to the goal, with a reason where it ended short of it."""
     target = goal.end(goal.control, solve.rest_volume)
+    solve.between = lambda: agreed_interrupt(solve.comm)
     try:
-        return solve.run(target, told.accepted, milestones, before=before, control=goal.control)
-    except KeyboardInterrupt:
-        if solve.comm.rank == 0:
-            record.save("interrupted", told.last)
-        reached = goal.where(solve.stage, solve.path.parameter)
-        log.info(f"interrupted at {reached}; the result up to there is in {record.directory}")
-        raise
+        with deferred():
+            return solve.run(target, told.accepted, milestones, before=before, control=goal.control)
+    except Interrupted:
+        status = f"interrupted at {goal.where(solve.stage, solve.path.parameter)}"
+        with room_in(record.directory, RESUME):
+            record.finished(status, told.last)
+        text = f"{status}; the result up to there is in {record.directory}: --resume goes on from it"
+        raise Interrupted(text) from None
     except ConvergenceError as error:
         return error.result
 
@@ -182,16 +192,15 @@ def _extras_there(out):
 
 def _prepare(design, directory, mesh_size, identity, resume):
     """(facts of the mesh, checkpoint to go on from or None); rank 0."""
-    out = output_directory(directory / "solve")
-    for old in out.glob(".*-????????.*"):
-        old.unlink()  # half a file of a killed run
+    out = directory / "solve"
     kept = read_checkpoint(out, identity) if resume else None
     if resume and not kept:
         log.info(f"no {CHECKPOINT} in {out}: starting from the beginning")
     if not kept:
         for old in [*out.glob("step_*.vtu"), out / "solution.pvd", out / "run.json", out / CHECKPOINT]:
             old.unlink(missing_ok=True)  # of an earlier run, which may have had more steps
-    return _mesh(design, directory / "mesh", mesh_size), kept
+    with output_folder(directory / "mesh") as folder:
+        return _mesh(design, folder, mesh_size), kept
 
 
 def _mesh(design, folder, mesh_size):

@@ -9,11 +9,11 @@ from typing import Any
 
 from mpi4py import MPI
 
-from pneunet.base.files.atomic import output_directory, read_csv, room_in, write_csv
+from pneunet.base.files.atomic import read_csv, room_in, write_csv
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CASE, ENDING, MARKS
 from pneunet.hifi.contact.touch import marked
-from pneunet.hifi.fem.agreement import on_rank_0
+from pneunet.hifi.fem.agreement import folder_of_all, on_rank_0
 from pneunet.hifi.runs.case_process import REFUSED
 from pneunet.hifi.runs.cases import Case, run_cases
 from pneunet.hifi.runs.study.file import Study, StudyCase, read_study, value_of
@@ -36,14 +36,14 @@ def run_study(
     """
     directory, started = Path(directory), time.perf_counter()
     study = on_rank_0(comm, lambda: read_study(path))
-    on_rank_0(comm, lambda: output_directory(directory) and None)
-    for text in _announcement(study, comm.size):
-        log.info(text)
-    table = StudyTable(study, directory)
-    cases = [c.case for c in study.cases if c.case]
-    records = run_cases(cases, directory / "cases", study.limits, comm, table.add, retry)
-    seconds = time.perf_counter() - started
-    on_rank_0(comm, lambda: _finish(study, table, records, directory, comm.size, seconds))
+    with folder_of_all(comm, directory):
+        for text in _announcement(study, comm.size):
+            log.info(text)
+        table = StudyTable(study, directory)
+        cases = [c.case for c in study.cases if c.case]
+        records = run_cases(cases, directory / "cases", study.limits, comm, table.add, retry)
+        seconds = time.perf_counter() - started
+        on_rank_0(comm, lambda: _finish(study, table, records, directory, comm.size, seconds))
     return study, table
 
 
