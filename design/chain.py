@@ -78,7 +78,9 @@ def solve(
     arguments += ["--no-fields"] * (not fields) + ["--resume"] * resume
     folder = design.save(directory)
     run_command(["solve", str(folder / "design.toml"), *arguments], ranks)
-    solution = read_design_folder(folder).solve
+    found = read_design_folder(folder)
+    found.require_whole()
+    solution = found.solve
     assert solution is not None, "a solve that ends well leaves its tables"
     return solution
 

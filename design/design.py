@@ -78,6 +78,7 @@ class Design:
         if path.name != "design.toml" and not path.is_dir():
             return cls(read_design_file(path), chosen_law("trained" if law is None else law))
         folder = read_design_folder(path if path.is_dir() else path.parent)
+        folder.require_whole()
         content, told = folder.design, folder.design.result
         return cls(
             content,

@@ -55,11 +55,11 @@ def read_table(path: str | Path, numbers: Sequence[str] = ()) -> np.ndarray:
     words.
     """
     header, rows = read_csv(path)
+    if "" in header or len(set(header)) < len(header):
+        raise InputError(f"{path}: two columns have the same name, or one has none: make the file again")
     for name in numbers:
         if name not in header:
             raise InputError(f"{path}: column '{name}' is missing")
-    if "" in header or len(set(header)) < len(header):
-        raise InputError(f"{path}: two columns have the same name, or one has none: make the file again")
     columns = {name: [row[i] if i < len(row) else "" for row in rows] for i, name in enumerate(header)}
     fields = {}
     for name, cells in columns.items():

@@ -3,10 +3,14 @@ pictures of them)."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree
 
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.errors import InputError
+from pneunet.base.files.reading import open_file
+from pneunet.base.files.text import read_text
 from pneunet.base.pictures.rendering import edges
 from pneunet.base.pictures.walls import FIELD
 from pneunet.design.report.labels import TARGET, segment_colour
@@ -15,6 +19,9 @@ from pneunet.reduced.rod.laws import SegmentLaw
 
 if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
+
+#: bytes of a step's file
+LARGEST_FIELDS = 2_000_000_000
 
 
 def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple["PolyData", dict]:
@@ -50,12 +57,49 @@ def painted(mesh: "PolyData") -> list[tuple["PolyData", dict]]:
 
 
 def read_solution(path: str | Path) -> "UnstructuredGrid":
-    """The last step of a ParaView collection as the undeformed pyvista grid with its point data."""
+    """The last step of a ParaView collection as the undeformed pyvista grid with its point data; InputError
+    where that is damaged."""
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    shown = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.GlobalWarningDisplayOff()  # the reader's own words come in many lines
+    try:
+        name = _last_step(path)
+        grid = _read_grid(name)
+    finally:
+        vtkObject.SetGlobalWarningDisplay(shown)
+    corners = np.asarray(grid.cell_connectivity) if grid.n_cells else np.zeros(1, int)
+    moved = grid.point_data.get("displacement", np.empty(0))
+    sound = grid.n_cells and corners.min() >= 0 and corners.max() < grid.n_points
+    if not sound or np.shape(moved) != (grid.n_points, 3) or not np.isfinite([moved, grid.points]).all():
+        raise InputError(f"{name}: is damaged: it holds no body with finite displacements")
+    return grid
+
+
+def _last_step(path):
+    """The last file that a collection names, which lies beside it."""
+    try:
+        listed = ElementTree.fromstring(read_text(path)).findall(".//DataSet")
+        name = max(listed, key=lambda each: float(each.get("timestep", "nan"))).get("file", "")
+    except (ElementTree.ParseError, ValueError) as error:
+        raise InputError(f"{path}: is damaged ({error})") from None
+    if not name or Path(name).name != name:
+        raise InputError(f"{path}: names a file that does not lie beside it")
+    return Path(path).with_name(name)
+
+
+def _read_grid(path):
     import pyvista
 
-    reader = pyvista.get_reader(str(path))
-    reader.set_active_time_value(reader.time_values[-1])
-    return reader.read()[0]
+    try:
+        with open_file(path, LARGEST_FIELDS) as stream:  # VTK itself crashes on half a file
+            for _, element in ElementTree.iterparse(stream):
+                element.clear()
+        return pyvista.read(path)
+    except InputError:
+        raise
+    except Exception as error:  # the reader's are of many types
+        raise InputError(f"{path}: is damaged ({error})") from None
 
 
 def facing_walls(surface: "PolyData") -> "PolyData | None":

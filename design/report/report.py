@@ -2,16 +2,19 @@
 
 import base64
 import logging
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 
 import numpy as np
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import revision
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report import figures
+from pneunet.design.report.bodies import read_solution
 from pneunet.design.report.comparison import CONFIRMS, ROUGHLY, Comparison, overlaps, stopped_short, verdict
 from pneunet.design.report.drawing import draw_drawing, segment_table
 from pneunet.design.report.labels import kPa, plain, segment_name, significant
@@ -63,7 +66,9 @@ def write_report(directory: str | Path, law: SegmentLaw | None = None) -> Path:
     law: a SegmentLaw, by default the one that the folder was designed with. Shows what is there: without a
     mesh or a finite element solution it says so. InputError without design.toml.
     """
-    run = read_design_folder(directory)
+    run = _with_sound_fields(read_design_folder(directory))
+    for text in run.damaged:
+        log.warning(f"warning: left out of the report: {text}")
     law = choose_law(run.law) if law is None else law
     with output_folder(run.directory), output_folder(run.directory / "report") as folder:
         return _write(run, law, folder)
@@ -97,6 +102,18 @@ def _write(run, law, folder):
     log.info(verdict(run, comparison))
     log.info(f"report: {path}")
     return path
+
+
+def _with_sound_fields(run):
+    """The DesignFolder, without a solution's fields where they are damaged."""
+    if run.solve is None or run.solve.solution is None:
+        return run
+    try:
+        read_solution(run.solve.solution)
+        return run
+    except InputError as error:
+        told = str(error).removeprefix(f"{run.directory}/")
+        return replace(run, solve=replace(run.solve, solution=None), damaged=(*run.damaged, told))
 
 
 def _image(folder, name, caption):
@@ -153,6 +170,7 @@ def _headline(run, comparison):
     )
     out += f'<p class="verdict">{escape(verdict(run, comparison))}</p>'
     out += _alarms(run)
+    out += "".join(f'<p class="note">Damaged, and left out: {escape(text)}</p>' for text in run.damaged)
     out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
     if c.reduced_solved:
         out += (

@@ -97,6 +97,87 @@ def test_rest_state_alone_is_no_solution(tmp_path):
     assert read_design_folder(tmp_path).solve is None
 
 
+def _cell(row, column, value):
+    def change(text):
+        rows = [line.split(",") for line in text.splitlines()]
+        rows[row][column] = value
+        return "\n".join(map(",".join, rows)) + "\n"
+
+    return change
+
+
+#: file -> what becomes of its text; what is said; what is left
+DAMAGED = {
+    "a list": ("run.json", lambda text: "[1, 2]", "run.json: must hold a JSON object", "solve"),
+    "a record's law": ("run.json", lambda text: '{"inputs": {"law": 5}}', "'inputs.law' is 5", "solve"),
+    "no mesh.json": ("mesh/mesh.json", lambda text: text[:20], "mesh.json: not valid JSON", "solve"),
+    "limit points": (
+        "solve/run.json",
+        lambda text: '{"limit_points": [3]}',
+        "run.json: 'limit_points' holds 3",
+        "solve",
+    ),
+    "nan in steps": (
+        "solve/steps.csv",
+        _cell(3, 1, "nan"),
+        "steps.csv row 4: 'pressure_kPa' is not",
+        "target",
+    ),
+    "nan in a centreline": (
+        "solve/centrelines.csv",
+        _cell(-1, 3, "inf"),
+        "'x_mm' is not a finite number",
+        "target",
+    ),
+    "arc length": ("solve/centrelines.csv", _cell(-1, 2, "0"), "'s_mm' of a step does not rise", "target"),
+    "segments": (
+        "solve/segments.csv",
+        lambda text: text[: text.rindex("\n", 0, -1) + 1],
+        "holds 2 segments in the last step",
+        "target",
+    ),
+    "walls": ("solve/walls.csv", _cell(1, 0, "9"), "walls.csv: names a segment or a gap", "solve"),
+    "an open quotation": ("solve/walls.csv", lambda text: text + '"1', "quotation mark", "solve"),
+    "target": ("target.csv", _cell(2, 1, "x"), "target.csv: column 'y_mm' holds words", "solve"),
+    "two columns": ("centreline.csv", lambda text: "s_mm,s_mm\n1,2", "two columns have the same", "solve"),
+}
+
+
+@pytest.mark.parametrize(("name", "change", "told", "left"), DAMAGED.values(), ids=DAMAGED)
+def test_what_is_damaged_is_named_and_the_rest_read(tmp_path, name, change, told, left):
+    make_run(tmp_path, fields=False)
+    path = tmp_path / name
+    path.write_text(change(path.read_text()))
+    folder = read_design_folder(tmp_path)
+    assert len(folder.damaged) == 1 and told in folder.damaged[0] and str(tmp_path) not in folder.damaged[0]
+    assert getattr(folder, left) is not None and (folder.solve is None) == (left == "target")
+    with pytest.raises(InputError, match=name):
+        folder.require_whole()
+
+
+def test_a_report_of_damaged_parts_shows_the_others(tmp_path, caplog):
+    pytest.importorskip("pyvista")
+    from pneunet.design.report.bodies import read_solution
+    from pneunet.design.report.report import write_report
+
+    caplog.set_level("INFO", "pneunet")
+    make_run(tmp_path, (PLANE,))
+    solution = tmp_path / "solve" / "solution.pvd"
+    step = next(solution.parent.glob("*.vtu"))
+    whole = step.read_bytes()
+    for content in (whole[: len(whole) // 2], b"", whole.replace(b'Name="displacement"', b'Name="movement"')):
+        step.write_bytes(content)
+        with pytest.raises(InputError, match=f"{step.name}: is damaged"):
+            read_solution(solution)
+    (tmp_path / "target.csv").write_bytes(bytes(300))
+    page = write_report(tmp_path).read_text()
+    assert page.count("Damaged, and left out") == 2 == sum("left out" in text for text in caplog.messages)
+    assert "finite element solution of the whole manipulator" in page and f"{step.name}: is damaged" in page
+    solution.write_text(solution.read_text().replace(step.name, f"../../{step.name}"))
+    with pytest.raises(InputError, match="does not lie beside it"):
+        read_solution(solution)
+
+
 def test_report_page_is_whole_and_self_contained(tmp_path):
     pytest.importorskip("pyvista")
     from pneunet.design.report.report import write_report
