@@ -115,10 +115,15 @@ def room_in(directory: str | Path, then: str = "") -> Iterator[None]:
 
 
 def require_writable(path: str | Path) -> None:
-    """InputError when `path` could not be made or written to; makes nothing itself, for use before long
+    """InputError when the folder `path` could not be made or written to; leaves nothing, for use before long
     work."""
-    existing = Path(path).absolute()
-    while not existing.exists():
-        existing = existing.parent
-    if not existing.is_dir() or not os.access(existing, os.W_OK):
-        raise InputError(f"{path}: cannot be written to: choose another folder with -o")
+    existing = whole = Path(path).absolute()
+    try:
+        while not existing.exists():
+            existing = existing.parent
+        with tempfile.TemporaryDirectory(dir=existing, prefix=".try-") as trial:
+            (Path(trial) / whole.relative_to(existing)).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be written to ({error.strerror}): choose another folder with -o"
+        ) from None
