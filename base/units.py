@@ -12,6 +12,9 @@ GRAVITY = 9810.0  # mm/s^2
 #: more than silicone bears: a larger number is in another unit
 LARGEST_PRESSURE_KPA = 2000.0
 
+#: mm; as people name units of length
+LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4, "inch": 25.4}
+
 #: unit suffix of a file key -> factor to the consistent system
 TO_INTERNAL = {
     "mm": 1.0,

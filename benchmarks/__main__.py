@@ -21,6 +21,7 @@ from benchmarks import (
     law,
     paper,
     paper_page,
+    people,
     remeshed,
     rod,
     segments,
@@ -70,6 +71,7 @@ PARTS = {
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
     ),
+    "people": (people.people, "files as people bring them against the right answer of each; some minutes"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "remeshed": (
         remeshed.remeshed,

@@ -24,6 +24,7 @@ from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.overlap import overlap_doubts
 from pneunet.reduced.rod.prediction import doubts, predict
 
 if TYPE_CHECKING:
@@ -119,8 +120,9 @@ class Design:
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """Reasons, one a line, not to trust the law at the design's pressure."""
-        return doubts(self.manipulator, self.content.pressure, self.law)
+        """Reasons, one a line, not to trust the prediction at the design's pressure."""
+        of_the_law = doubts(self.manipulator, self.content.pressure, self.law)
+        return of_the_law + overlap_doubts(self.manipulator, self.prediction)
 
     @cached_property
     def strains(self) -> RodStrains:

@@ -3,6 +3,7 @@ animation."""
 
 import logging
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from pneunet.geometry.designfile import read_design_file
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.overlap import overlap_doubts
 from pneunet.reduced.rod.prediction import doubts
 
 log = logging.getLogger(__name__)
@@ -49,15 +51,6 @@ def run_shape(
         pressures_kPa = [design.pressure_kPa * i / STEPS for i in range(1, STEPS + 1)]
     if not len(pressures_kPa):
         raise InputError("--pressure-kPa: give at least one pressure")
-    doubted = doubts(design.manipulator, [in_MPa(p) for p in pressures_kPa], design.law)
-    tell_doubts(doubted, design.law, outside)
-    with output_folder(Path(directory) / "shape") as folder:
-        _write(folder, design_path, design, pressures_kPa, doubted)
-    return folder
-
-
-def _write(folder, design_path, design, pressures_kPa, doubted):
-    """The files of `run_shape`."""
     shapes: dict[float, Centreline] = {}
     failed: dict[float, str] = {}
     for p in sorted(set(pressures_kPa)):
@@ -67,6 +60,17 @@ def _write(folder, design_path, design, pressures_kPa, doubted):
             failed[p] = str(error)
     if not shapes:
         raise ConvergenceError(f"no shape at {_list(failed)} kPa: {next(iter(failed.values()))}")
+    doubted = doubts(design.manipulator, [in_MPa(p) for p in pressures_kPa], design.law)
+    overlaps = ((p, text) for p, line in shapes.items() for text in overlap_doubts(design.manipulator, line))
+    doubted += tuple(f"from {plain(p)} kPa on {text}" for p, text in islice(overlaps, 1))
+    tell_doubts(doubted, design.law, outside)
+    with output_folder(Path(directory) / "shape") as folder:
+        _write(folder, design_path, design, shapes, failed, doubted)
+    return folder
+
+
+def _write(folder, design_path, design, shapes, failed, doubted):
+    """The files of `run_shape`."""
     write_csv(
         folder / "centrelines.csv",
         SHAPES,

@@ -13,7 +13,7 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.text import read_numbers_table
-from pneunet.base.units import MPA_PER_KPA
+from pneunet.base.units import LENGTHS, MPA_PER_KPA
 
 #: MPa
 STRESS_UNITS = {
@@ -32,8 +32,6 @@ STRESS_UNITS = {
     "ksi": 6.894757,
 }
 RATIOS = {"%": 0.01, "percent": 0.01, "pct": 0.01, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0}
-#: mm
-LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4, "inch": 25.4}
 #: more strain than this, without a unit, is taken for percent by no one but the user
 LARGEST_STRAIN = 25.0
 #: columns of other things: true measures, spread about a mean, rates, single results

@@ -14,9 +14,9 @@ from contextlib import AbstractContextManager, contextmanager
 from pneunet.base.system.log import complain, under_launcher
 
 #: as which a launcher hands them on, again and again: mpirun kills its ranks soon after the others
-HANDED_ON = getattr(signal, "SIGUSR1", None)
+HANDED_ON = getattr(signal, "SIGUSR1", signal.SIGTERM)
 #: Ctrl-C; a batch system's; a launcher's
-SIGNALS = [number for number in (signal.SIGINT, signal.SIGTERM, HANDED_ON) if number]
+SIGNALS = {signal.SIGINT, signal.SIGTERM, HANDED_ON}
 EXIT_CODE = 130
 #: programs like timeout signal a process and its group, which is one signal twice
 SAME_SECONDS = 0.5

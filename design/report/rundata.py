@@ -159,7 +159,7 @@ def _record(path, kinds):
         if not isinstance(point, dict) or not {"kind", "pressure_kPa", "volume_mm3"} <= set(point):
             raise InputError(f"{path}: 'limit_points' holds {shown(point)}, which no run has written")
         numbers = point["pressure_kPa"], point["volume_mm3"]
-        if not all(isinstance(value, Real) and np.isfinite(value) for value in numbers):
+        if not all(isinstance(value, (int, float)) and np.isfinite(value) for value in numbers):
             raise InputError(f"{path}: 'limit_points' holds {shown(point)}, which no run has written")
     return record
 

@@ -3,24 +3,27 @@
 Every bad input is one line that names the key and the fix.
 """
 
+import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import read_csv
 from pneunet.base.files.schemas import POINT
+from pneunet.base.files.text import read_numbers_table
 from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.strains import helix_frenet
-from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
+from pneunet.base.units import KPA_PER_MPA, LENGTHS, MPA_PER_KPA
 from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Piece, Target
 from pneunet.geometry.parameters import TWISTING, Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
+log = logging.getLogger(__name__)
 FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
 
 #: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
@@ -45,12 +48,8 @@ def read_target(path: str | Path) -> Target:
         path = SHIPPED / f"{path}.toml"
     if path.suffix.lower() == ".toml":
         return _from_toml(path)
-    if path.suffix.lower() == ".csv":
-        points, frames = _read_points(path)
-        return _target(str(path), points=points, frames=frames, name=path.stem, source=path.name)
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    raise InputError(f"{path}: a target is a .csv of points in mm or a .toml")
+    points, frames = _read_points(path)
+    return _target(str(path), points=points, frames=frames, name=path.stem, source=path.name)
 
 
 def _target(where, **values):
@@ -63,46 +62,40 @@ def _target(where, **values):
 # ---- CSV
 
 
-def _is_number(cell):
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+#: a column's name, with or without the unit that is said of it or below it
+_COLUMN = re.compile(r"(t[12])?[xyz]", re.IGNORECASE)
+_NAMED = re.compile(r"(\w+?)[\s_]*(?:in\s+|[(\[])?\s*(mm|cm|m|um|µm|inch|in)?\s*[)\]]?", re.IGNORECASE)
 
 
 def _read_points(path):
     """(points (n, 3), frames (n, 3, 3) or None) of a CSV: named columns, or three bare columns of numbers."""
-    first, rows = read_csv(path)
-    header = [cell.strip().lstrip("\ufeff") for cell in first]
-    if all(_is_number(cell) for cell in header):
-        if len(header) != 3:
-            raise InputError(f"{path}: a CSV without a header has 3 columns x, y, z in mm, not {len(header)}")
-        header, rows, skipped = list(POINT), [first, *rows], 0
-    else:
-        skipped = 1
-        refuse_unknown(dict.fromkeys(header), [*POINT, *FRAME_COLUMNS], f"{path} header")
-    values = _numbers(path, header, rows, skipped)
-    missing = [c for c in POINT if c not in values]
-    if missing:
-        raise InputError(f"{path}: column '{missing[0]}' is missing")
-    points = np.column_stack([values[c] for c in POINT])
+    table = read_numbers_table(path)
+    if not table.header and table.width != 3:
+        raise InputError(f"{path}: a CSV without a header has 3 columns x, y, z in mm, not {table.width}")
+    values, units, left = {}, {}, []
+    for i, name in enumerate(table.header or POINT):
+        found = _NAMED.fullmatch(f"{name} {table.units[i]}".strip() if table.units else name.strip())
+        if not found or not _COLUMN.fullmatch(found[1]):
+            left.append(name)
+            continue
+        key = found[1].lower()
+        if key in values:
+            raise InputError(f"{path}: two columns '{key}': rename or delete one")
+        values[key] = table.numbers(i)
+        if len(key) == 1:
+            units[key] = (found[2] or "mm").lower().replace("µ", "u")
+    for key in "xyz":
+        if key not in values:
+            raise InputError(
+                f"{path}: column '{key}_mm' is missing: there are {', '.join(table.header)[:200]}"
+            )
+    if len(set(units.values())) > 1:
+        given = ", ".join(f"{key} in {unit}" for key, unit in units.items())
+        raise InputError(f"{path}: {given}: write all three in the same unit")
+    if any(left):
+        log.info(f"{path}: columns that are not used: {', '.join(filter(None, left))[:200]}")
+    points = LENGTHS[units["x"]] * np.column_stack([values[c] for c in "xyz"])
     return points, _frames_of(values, path) if "t1x" in values or "t2x" in values else None
-
-
-def _numbers(path, header, rows, skipped):
-    table = np.empty((len(rows), len(header)))
-    for i, row in enumerate(rows):
-        if len(row) != len(header):
-            raise InputError(f"{path} row {i + 1 + skipped}: {len(row)} columns instead of {len(header)}")
-        for j, cell in enumerate(row):
-            if not _is_number(cell) or not np.isfinite(float(cell)):
-                raise InputError(
-                    f"{path} row {i + 1 + skipped}: '{header[j]}' must be a finite number, not"
-                    f" '{cell.strip()}'"
-                )
-            table[i, j] = float(cell)
-    return dict(zip(header, table.T))
 
 
 def _frames_of(values, where):
@@ -255,12 +248,14 @@ class _Given(Checked):
     """What a [[piece]] may say; PIECE_KEYS: the keys that go with its kind."""
 
     kind: str = quantity(None, choices=tuple(PIECE_KEYS))
-    length: float = quantity("mm", note="deformed length", above=0)
-    twist: float | None = quantity("rad_per_mm", None, key="tau_rad_per_mm")
-    curvature: float | None = quantity("per_m", None, above=0, hint="its direction follows from the points")
-    torsion: float | None = quantity("rad_per_m", None)
-    cylinder_curvature: float | None = quantity("per_m", None, above=0)
-    pitch: float | None = quantity("mm", None)
+    length: float = quantity("mm", note="deformed length", above=0, low=1, high=2000)
+    twist: float | None = quantity("rad_per_mm", None, key="tau_rad_per_mm", low=-2, high=2)
+    curvature: float | None = quantity(
+        "per_m", None, above=0, high=2e3, low=1e-6, hint="its direction follows from the points"
+    )
+    torsion: float | None = quantity("rad_per_m", None, low=-2e3, high=2e3)
+    cylinder_curvature: float | None = quantity("per_m", None, above=0, low=1e-6, high=2e3)
+    pitch: float | None = quantity("mm", None, low=-1e5, high=1e5)
 
 
 def _piece(row, where):
@@ -301,7 +296,7 @@ def _unit_vector(table, key, where):
     if key not in table:
         return None
     vector = _array([table[key]], key, where, 2)[0]
-    if vector.shape != (3,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0:
+    if vector.shape != (3,) or not 0 < np.linalg.norm(vector) < np.inf:
         raise InputError(f"{where}: '{key}' must be three numbers, not all 0")
     return vector / np.linalg.norm(vector)
 

@@ -7,6 +7,8 @@ import numpy as np
 from pneunet.base.curve import Curve
 
 PAIRS = 201
+#: a point of the reference that is farther from its partner than this share of the length is not followed
+FOLLOWED = 0.02
 
 
 @dataclass(frozen=True)
@@ -17,6 +19,8 @@ class Errors:
     the paper's Eq. 27, the *sum* over the reference's points of the squared distance to the curve (the paper
         calls it a mean squared error; a curve that is too long does not raise it).
     hausdorff: largest distance from either curve to the other.  tip: distance of the last points.
+    not_followed: share of the reference's length whose points are farther than FOLLOWED of it from their
+        partners, as where it folds back or has corners.
     """
 
     rms: float
@@ -26,6 +30,7 @@ class Errors:
     tip: float
     length: float
     reference_length: float
+    not_followed: float
 
     @property
     def length_mismatch(self) -> float:
@@ -47,16 +52,26 @@ class Errors:
             "hausdorff_percent_of_length": self.percent(self.hausdorff),
             "tip_mm": self.tip,
             "tip_percent_of_length": self.percent(self.tip),
+            "not_followed_percent": 100 * self.not_followed,
+            "followed_within_mm": FOLLOWED * self.reference_length,
             "length_mm": self.length,
             "reference_length_mm": self.reference_length,
             "length_mismatch_mm": self.length_mismatch,
             "length_mismatch_percent": self.percent(self.length_mismatch),
         }
 
+    @property
+    def doubt(self) -> str:
+        """What of the reference is not followed, in words; '' where all of it is."""
+        within = f"{FOLLOWED * self.reference_length:.1f} mm"
+        share = f"not followed: {100 * self.not_followed:.0f} % of length (farther than {within} away)"
+        return share if self.not_followed > 0 else ""
+
     def lines(self) -> list[str]:
         """The same for people, a line each."""
         return [
             f"RMS, paired by arc length  {self.rms:8.3f} mm   ({self.percent(self.rms):.2f} % of length)",
+            *filter(None, [self.doubt]),
             f"Eq. 27, sum over {self.eq27_points:4d} points {self.eq27:8.3f} mm^2",
             f"Hausdorff, two-sided       {self.hausdorff:8.3f} mm   ({self.percent(self.hausdorff):.2f} %)",
             f"tip                        {self.tip:8.3f} mm   ({self.percent(self.tip):.2f} %)",
@@ -67,9 +82,14 @@ class Errors:
         ]
 
 
+def paired(a: Curve, b: Curve, pairs: int = PAIRS) -> np.ndarray:
+    """Distances (pairs,) in mm of points paired at equal fractions of the curves' own arc lengths."""
+    return np.linalg.norm(a.evenly(pairs) - b.evenly(pairs), axis=1)
+
+
 def paired_rms(a: Curve, b: Curve, pairs: int = PAIRS) -> float:
-    """RMS distance in mm of points paired at equal fractions of the curves' own arc lengths."""
-    return float(np.sqrt(np.mean(np.sum((a.evenly(pairs) - b.evenly(pairs)) ** 2, axis=1))))
+    """Their root mean square, mm."""
+    return float(np.sqrt(np.mean(paired(a, b, pairs) ** 2)))
 
 
 def eq27(points: np.ndarray, curve: Curve) -> float:
@@ -97,4 +117,5 @@ def compare(curve: Curve | np.ndarray, reference: Curve | np.ndarray) -> Errors:
         tip=float(np.linalg.norm(curve.points[-1] - reference.points[-1])),
         length=curve.length,
         reference_length=reference.length,
+        not_followed=float(np.mean(paired(curve, reference) > FOLLOWED * reference.length)),
     )

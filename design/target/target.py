@@ -9,6 +9,7 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic
+from pneunet.geometry.designfile import FARTHEST
 
 #: kinds of pieces; straight ones are TWISTING, as the segments are that follow them
 BENDING, HELICAL = "bending", "helical"
@@ -101,11 +102,16 @@ def check_points(points: np.ndarray) -> None:
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise InputError(f"point {bad[0] + 1} is not finite: every coordinate must be a number")
+    far = np.flatnonzero((abs(points) > FARTHEST).any(axis=1))
+    if len(far):
+        raise InputError(f"point {far[0] + 1} is over {FARTHEST:g} mm away: are its coordinates in mm?")
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = steps.sum()
     repeated = np.flatnonzero(steps <= 1e-9 * length)
     if len(repeated):
-        raise InputError(f"points {repeated[0] + 1} and {repeated[0] + 2} are the same: remove one")
+        more = f", and {len(repeated) - 1} more such pairs" if len(repeated) > 1 else ""
+        same = f"points {repeated[0] + 1} and {repeated[0] + 2} are the same{more}"
+        raise InputError(f"{same}: remove one of each")
     if not 10 <= length <= 2000:
         raise InputError(
             f"the curve is {length:.4g} mm long, outside 10..2000 mm: are its coordinates in mm?"

@@ -81,15 +81,19 @@ def test_shipped_target_by_name_with_own_keys(tmp_path):
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("", "is empty"),
-        ("x_mm,y_mm,z_mm\n0,0,0\n1,a,0\n2,0,0\n3,0,0\n", "row 3: 'y_mm' must be a finite number, not 'a'"),
-        ("0,0,0\n1,nan,0\n2,0,0\n3,0,0\n", "row 2: 'y_mm' must be a finite number, not 'nan'"),
+        ("", "holds no rows of numbers"),
+        ("x_mm,y_mm,z_mm\n0,0,0\n1,a,0\n2,0,0\n3,0,0\n", "row 3: 'a' is not a finite number under 'y_mm'"),
+        ("0,0,0\n1,nan,0\n2,0,0\n3,0,0\n", "row 2: 'nan' is not a finite number under 'column 2'"),
         ("0,0,0\n10,0,0\n20,0,0\n", "3 points: a target needs at least 4"),
         ("0,0,0\n10,0,0\n10,0,0\n20,0,0\n", "points 2 and 3 are the same"),
         ("0,0\n1,1\n2,2\n3,3\n", "has 3 columns x, y, z in mm, not 2"),
-        ("0,0,0\n10,0\n20,0,0\n30,0,0\n", "row 2: 2 columns instead of 3"),
-        ("x,y,z\n0,0,0\n", "key 'x' has the wrong unit: write 'x_mm'"),
-        ("x_m,y_m,z_m\n0,0,0\n", "key 'x_m' has the wrong unit: write 'x_mm'"),
+        ("0,0,0\n10,0\n20,0,0\n30,0,0\n", "row 2: is empty under 'column 3'"),
+        ("x_mm,y [m],z_mm\n0,0,0\n", "x in mm, y in m, z in mm: write all three in the same unit"),
+        ("x_mm,x,y_mm,z_mm\n0,0,0,0\n", "two columns 'x'"),
+        ("x_km,y_km,z_km\n0,0,0\n", "column 'x_mm' is missing: there are x_km, y_km, z_km"),
+        ("0,0,0\n10,0,0\n10,0,0\n10,0,0\n20,0,0\n", "are the same, and 1 more such pairs"),
+        ("0,0,0\n2e6,0,0\n10,0,0\n20,0,0\n", "point 2 is over 1e+06 mm away"),
+        ("0,0,0\n1e300,0,0\n10,0,0\n20,0,0\n", "row 2: '1e300' is not a finite number"),
         ("x_mm,y_mm\n0,0\n", "column 'z_mm' is missing"),
         ("0,0,0\n.01,0,0\n.02,0,0\n.03,0,0\n", "are its coordinates in mm?"),
         (
@@ -170,5 +174,5 @@ def test_missing_or_strange_files(tmp_path):
         with pytest.raises(InputError, match="no such file"):
             read_target(tmp_path / name)
     (tmp_path / "a.txt").write_text("hello")
-    with pytest.raises(InputError, match="a target is a .csv"):
+    with pytest.raises(InputError, match="holds no rows of numbers"):
         read_target(Path(tmp_path / "a.txt"))

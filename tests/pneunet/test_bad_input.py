@@ -60,22 +60,23 @@ def changed(text, old, new):
 
 
 CSV = {
-    "text": (["x_mm,y_mm,z_mm", "0,0,0", "1,two,3"], "row 3: 'y_mm' must be a finite number, not 'two'"),
-    "NaN": ([*CURVE, "60,nan,0"], "row 8: 'y_mm' must be a finite number, not 'nan'"),
-    "infinite": ([*CURVE, "60,inf,0"], "row 8: 'y_mm' must be a finite number"),
-    "an empty cell": ([*CURVE, "60,,0"], "row 8: 'y_mm' must be a finite number, not ''"),
-    "a short row": ([*CURVE, "60,1"], "row 8: 2 columns instead of 3"),
+    "text": (["x_mm,y_mm,z_mm", "0,0,0", "1,two,3"], "row 3: 'two' is not a finite number under 'y_mm'"),
+    "NaN": ([*CURVE, "60,nan,0"], "row 8: 'nan' is not a finite number under 'y_mm'"),
+    "infinite": ([*CURVE, "60,inf,0"], "row 8: 'inf' is not a finite number under 'y_mm'"),
+    "an empty cell": ([*CURVE, "60,,0"], "row 8: is empty under 'y_mm'"),
+    "a short row": ([*CURVE, "60,1"], "row 8: is empty under 'z_mm'"),
+    "lost markers": ([*CURVE, ",,", "60,1,0"], "row 8: is empty under 'x_mm'"),
     "three points": (CURVE[:4], "3 points: a target needs at least 4"),
-    "header alone": (CURVE[:1], "at least 4"),
+    "header alone": (CURVE[:1], "holds no rows of numbers"),
     "repeated points": ([*CURVE, CURVE[-1]], "points 6 and 7 are the same: remove one"),
     "metres": (["0,0,0", "0.05,0,0", "0.1,0,0", "0.15,0,0"], "are its coordinates in mm?"),
     "two columns": (["0,0", "1,0", "2,0", "3,0"], "3 columns x, y, z in mm, not 2"),
     "wrong unit": (
         changed("\n".join(CURVE), "y_mm", "y_m").split("\n"),
-        "'y_m' has the wrong unit: write 'y_mm'",
+        "x in mm, y in m, z in mm: write all three in the same unit",
     ),
     "missing column": (["x_mm,z_mm", "0,0", "1,0"], "column 'y_mm' is missing"),
-    "nothing": ([], "is empty"),
+    "nothing": ([], "holds no rows of numbers"),
 }
 
 
