@@ -17,6 +17,7 @@ from benchmarks import (
     chain,
     contact,
     contact_page,
+    door,
     house,
     law,
     paper,
@@ -46,6 +47,10 @@ PARTS = {
     "resume": (chain.resume, "a run killed with SIGKILL and resumed on 2 ranks against a whole one"),
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
+    "door": (
+        door.door,
+        "1500 generated bad inputs at every door of the command line: one line each; some 5 minutes",
+    ),
     "house": (
         house.house,
         "lines of Python, time of the import, type errors, the wheel's test; 3 minutes",

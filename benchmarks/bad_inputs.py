@@ -69,7 +69,8 @@ GOOD_TABLES: dict[str, dict] = {
     "study.toml": {
         "kind": "cell",
         "levels": 2,
-        "base": BODY | {"material": MATERIAL, "segment": SEGMENT},
+        "base": BODY
+        | {"material": MATERIAL, "segment": {k: v for k, v in SEGMENT.items() if k != "wall_mm"}},
         "grid": {"wall_mm": [1.0, 1.2]},
         "limits": {"time_s": 100.0, "memory_MB": 900.0},
     },
@@ -308,9 +309,7 @@ def _changed_numbers(random: Random, lines: list[str]) -> tuple[Content, str]:
         cell = rows[i][j] = _pick(random, NO_CELLS)
         what = f"cell {cell[:20]!r}"
     elif way < 0.65:
-        rows[0] = _pick(
-            random, (["a"] * len(rows[0]), ["x_m", *rows[0][1:]], [rows[0][0]] * len(rows[0]), ["1"] * 7)
-        )
+        rows[0] = _pick(random, (["a"] * len(rows[0]), ["x_m", *rows[0][1:]], [rows[0][0]] * len(rows[0])))
         what = f"header {rows[0]}"
     elif way < 0.72:
         rows, what = rows[:3], "two rows"

@@ -4,6 +4,7 @@ and in little memory.
 Commands run in process, in workers that are used again: a worker that hangs or dies is one unclean input.
 """
 
+import importlib
 import io
 import multiprocessing
 import os
@@ -23,6 +24,14 @@ from benchmarks.bad_inputs import BadInput, Content, bad_inputs, good_files
 
 NUMBER, SEED, WORKERS = 1500, 1, 2
 SECONDS, MEMORY_MB = 10.0, 1000.0
+#: what a command's first run waits for
+LIBRARIES = (
+    "front",
+    "geometry.cad.mesh",
+    "hifi.runs.study.study",
+    "hifi.runs.campaign.campaign",
+    "hifi.runs.cell",
+)
 #: after which a worker counts as hanging; and MB beyond which the system stops it
 PATIENCE, LIMIT_MB = 30.0, 3000
 
@@ -141,6 +150,8 @@ class _captured:
 def _work(pipe: Connection) -> None:
     """Answers to what comes through the pipe, within limits."""
     resource.setrlimit(resource.RLIMIT_DATA, (LIMIT_MB << 20,) * 2)
+    for name in LIBRARIES:
+        importlib.import_module(f"pneunet.{name}")
     while (bad := pipe.recv()) is not None:
         pipe.send(answer(bad))
 

@@ -2,21 +2,19 @@
 
 import json
 import logging
-import os
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import atomic_path, write_text
+from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.toml import to_table
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
-from pneunet.geometry.cad.meshing import refuse_absurd, save, tetrahedral_mesh
+from pneunet.geometry.cad.meshing import refuse_absurd, save, tetrahedral_mesh, write_model
 from pneunet.geometry.designfile import read_design_file
 from pneunet.geometry.meshfile import MESH, open_edges, volumes_and_quality
 from pneunet.geometry.parameters import Manipulator
@@ -53,8 +51,7 @@ def mesh_manipulator(manipulator: Manipulator, mesh_size: float, directory: str 
                 f"CAD: body {volumes['body_mm3']:.1f} mm3, cavity {volumes['cavity_mm3']:.1f} mm3"
                 f" ({time.perf_counter() - started:.1f} s)"
             )
-            with atomic_path(directory / "manipulator.step") as temporary, _quiet():
-                gmsh.write(str(temporary))
+            write_model(directory / "manipulator.step")
             gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
             gmsh.option.setNumber("Mesh.MeshSizeMin", 0.0)
             gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
@@ -87,19 +84,6 @@ def mesh_manipulator(manipulator: Manipulator, mesh_size: float, directory: str 
 def segment_tables(manipulator: Manipulator) -> list[dict]:
     """What a mesh depends on, in file units: every dimension, no material."""
     return [to_table(s) for s in manipulator.segments]
-
-
-@contextmanager
-def _quiet():
-    """OpenCASCADE's STEP writer prints a banner straight to file descriptor 1."""
-    kept = os.dup(1)
-    try:
-        with open(os.devnull, "w") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-            yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
 
 
 def _check(mesh, volumes):

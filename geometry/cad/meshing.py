@@ -1,6 +1,9 @@
 """From gmsh's model to a mesh on disk: arrays for finite elements, gmsh's own file for people."""
 
-from collections.abc import Iterable
+import errno
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +57,34 @@ def tetrahedral_mesh() -> TetrahedralMesh:
 
 def save(path: Path, mesh: TetrahedralMesh, facts: dict[str, Any]) -> None:
     """Write the .npz `path` and, beside it, gmsh's file of the current model."""
-    with atomic_path(path.with_suffix(".msh")) as temporary:
-        gmsh.option.setNumber("Mesh.Binary", 1)
-        gmsh.write(str(temporary))
+    gmsh.option.setNumber("Mesh.Binary", 1)
+    write_model(path.with_suffix(".msh"))
     mesh.write(path, facts)
+
+
+def write_model(path: Path) -> None:
+    """Write gmsh's current model as .step or its mesh as .msh. gmsh says nothing of a full disk: the file's
+    end tells whether it is whole."""
+    with atomic_path(path) as temporary, _quiet():
+        try:
+            gmsh.write(str(temporary))
+        except Exception as error:
+            raise OSError(errno.EIO, str(error).replace(str(temporary), "it")) from None
+        with open(temporary, "rb") as stream:
+            stream.seek(max(temporary.stat().st_size - 100, 0))
+            last = stream.read().split()[-1:]
+        if not last or not last[0].startswith((b"END-ISO", b"$End")):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """OpenCASCADE's STEP writer prints a banner straight to file descriptor 1."""
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
