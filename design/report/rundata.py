@@ -150,7 +150,7 @@ def _record(path, kinds):
     """run.json; InputError where a key that is read again holds something else."""
     record = read_record(path)
     for name, kind in kinds.items():
-        value = record
+        value: object = record
         for key in name.split("."):
             value = value.get(key) if isinstance(value, dict) else value
         if value is not None and (not isinstance(value, kind) or (value != value)):
