@@ -4,6 +4,7 @@ Exit codes: 0 done; 2 bad input, a load that could not be reached or too little 
 with one line on standard error, under MPI from one rank); anything else is a bug and shows its traceback.
 """
 
+import errno
 import os
 import sys
 from argparse import Namespace
@@ -137,9 +138,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(error)
         return 2
     except BrokenPipeError:  # `pneunet ... | head`: nobody reads on
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_output()
         return 141
+    except OSError as error:  # of what is printed: files tell by themselves
+        if error.errno not in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO):
+            raise
+        _close_output()
+        complain(f"output cannot be written ({error.strerror}): make room where it goes")
+        return 2
     except BaseException as error:
         if not told and not isinstance(error, KeyboardInterrupt):
             raise
         return leave(error)
+
+
+def _close_output():
+    """Python shall not try again at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -95,3 +95,30 @@ def test_another_schema_and_another_file_are_refused(tmp_path, data):
         read_dataset(path)
     with pytest.raises(InputError, match="'volume' has shape"):
         replace(data, volume=np.zeros(3))
+
+
+def test_what_is_wrong_in_a_file_is_named_with_its_member(tmp_path, data):
+    path = tmp_path / "cells.npz"
+    write_dataset(path, data)
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    energy, table = arrays["energy"].copy(), json.loads(bytes(arrays["about"]))
+    energy[3] = np.nan
+
+    def about(**changed):
+        return np.frombuffer(json.dumps(table | changed).encode(), np.uint8)
+
+    for changed, told in (
+        ({"energy": energy}, "member 'energy': holds nan"),
+        ({"energy": energy[1:]}, r"member 'energy': has shape \(7,\), not \(8,\)"),
+        ({"energy": energy.astype(complex)}, "member 'energy': its type is of kind 'c', not 'f'"),
+        ({"case": arrays["case"] + 2}, "member 'case': holds 3, where numbers in 0..3 are wanted"),
+        ({"kind": arrays["kind"] - 1}, "member 'kind': holds -1"),
+        ({"energy": None}, "member 'energy': is missing"),
+        ({"about": np.frombuffer(b"[1]", np.uint8)}, "member 'about': is no table of keys"),
+        ({"about": about(kinds="twisting")}, "member 'about' has no list 'kinds'"),
+        ({"about": about(meshes=[5])}, "member 'about': '5' is not understood"),
+    ):
+        np.savez(path, **{name: value for name, value in (arrays | changed).items() if value is not None})
+        with pytest.raises(InputError, match=f"cells.npz: {told}.*: make it again with pneunet campaign$"):
+            read_dataset(path)

@@ -1,6 +1,7 @@
 """Files are whole or not there."""
 
 import os
+import re
 
 import numpy as np
 import pytest
@@ -14,7 +15,10 @@ from pneunet.base.files.atomic import (
     write_csv,
     write_text,
 )
+from pneunet.base.files.dataset import read_dataset
 from pneunet.base.files.folder import output_folder
+from pneunet.base.files.reading import read_json
+from pneunet.base.files.toml import read_toml
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -121,3 +125,51 @@ def test_what_killed_runs_left_goes_and_nothing_of_anybody_else(tmp_path):
     with output_folder(tmp_path):
         assert sorted(tmp_path.iterdir()) == sorted([*theirs, tmp_path / ".lock"])
     assert sorted(tmp_path.iterdir()) == sorted(theirs)
+
+
+OUTLANDISH = {
+    "5000 digits": ("a = " + "1" * 5000, "not valid TOML"),
+    "400 zeros": ("a = 1" + "0" * 400, "'a' is larger than any number can be here"),
+    "hexadecimal": ("a = 0x" + "f" * 5000, "'a' is larger than any number can be here"),
+    "1e300 in a list": ("[b]\na = [[1, 1e300]]", "'a' is larger than any number can be here"),
+    "nesting": ("a = " + "[" * 2000 + "]" * 2000, "brackets within brackets without end"),
+    "less nesting": ("a = " + "[" * 30 + "]" * 30, "'a' is nested more than 20 deep"),
+    "NUL": ('a = "b\\u0000c"', "'a' holds control characters"),
+    "escape in a key": ('"\\u001b[2J" = 1', "holds control characters"),
+    "a long text": ('a = "' + "x" * 20_000 + '"', "a text of over 10000 characters"),
+    "another encoding": ("a = 1".encode("utf-16"), "not text in UTF-8"),
+    "Arabic digits": ("a = \u0665", "not valid TOML"),
+}
+
+
+@pytest.mark.parametrize(("content", "message"), OUTLANDISH.values(), ids=OUTLANDISH)
+def test_what_toml_can_say_and_no_quantity_is(tmp_path, content, message):
+    path = tmp_path / "file.toml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InputError, match=re.escape(message)) as error:
+        read_toml(path)
+    assert str(error.value).startswith(f"{path}: ") and len(str(error.value)) < 300
+
+
+@pytest.mark.parametrize("read", [read_toml, read_json, read_csv, read_dataset])
+def test_pipes_devices_and_huge_files_are_refused_at_once(tmp_path, read):
+    os.mkfifo(tmp_path / "pipe")
+    with open(tmp_path / "huge", "wb") as stream:
+        stream.truncate(5 << 30)
+    for path, message in (
+        (tmp_path / "pipe", "is a pipe or a device, not a regular file"),
+        ("/dev/zero", "is a pipe or a device"),
+        (tmp_path / "huge", "is over"),
+        (tmp_path, "is a folder"),
+        (tmp_path / ("n" * 300), "cannot be read"),
+        (f"{tmp_path}/a\0b", "must not hold a NUL"),
+    ):
+        with pytest.raises(InputError, match=message):
+            read(path)
+
+
+@pytest.mark.parametrize("content", ["[1]", "5", "{", "[" * 100_000, '{"a": ' + "1" * 5000 + "}", ""])
+def test_json_that_is_no_table_is_named(tmp_path, content):
+    (tmp_path / "run.json").write_text(content)
+    with pytest.raises(InputError, match="run.json: (not valid JSON|must hold a JSON object)"):
+        read_json(tmp_path / "run.json")

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.files.schemas import CENTRELINES, SEGMENTS, STEPS
 from pneunet.hifi.verification.reference_case import DATA
@@ -192,6 +193,31 @@ def test_an_interrupted_run_says_where_and_the_next_goes_on(whole, tmp_path, ran
     step = reached(tmp_path)
     assert f"resumed after step {step}" in solve(tmp_path, "--resume", "--no-fields").stdout
     assert reached(tmp_path) == reached(whole)
+
+
+def test_a_checkpoint_that_is_damaged_is_named(whole, tmp_path):
+    from pneunet.hifi.runs.solve.checkpoint import read_checkpoint
+
+    kept = whole / "solve" / "checkpoint.npz"
+    with np.load(kept) as stored:
+        arrays = dict(stored)
+    identity = json.loads(bytes(arrays["about"]))["belongs_to"]
+    assert read_checkpoint(whole / "solve", identity)["stage"]
+    path, bad = tmp_path / "checkpoint.npz", arrays["displacement_mm"].copy()
+    bad[0, 0, 0] = np.nan
+    for changed, told in (
+        ({"displacement_mm": bad}, "member 'displacement_mm': holds nan"),
+        ({"displacement_mm": bad[:, 1:]}, "member 'displacement_mm': has shape"),
+        ({"load": arrays["load"].astype(str)}, "member 'load': its type is of kind 'U'"),
+        ({"step": arrays["step"] * np.nan}, "members 'step', 'load' hold no accepted step"),
+        ({"trusted": None}, "member 'trusted': is missing"),
+    ):
+        np.savez(path, **{name: value for name, value in (arrays | changed).items() if value is not None})
+        with pytest.raises(InputError, match=f"checkpoint.npz: {told}.*solve without --resume$"):
+            read_checkpoint(tmp_path, identity)
+    path.write_bytes(kept.read_bytes()[:5000])
+    with pytest.raises(InputError, match="checkpoint.npz: not a checkpoint .*solve without --resume$"):
+        read_checkpoint(tmp_path, identity)
 
 
 def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):
