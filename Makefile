@@ -18,7 +18,7 @@ demo: setup ## target curve -> design -> CAD -> finite elements -> report
 	$(DEMO)
 
 test: setup ## all tests; those of the finite elements again on 2 ranks
-	$(VENV)/python -m pytest
+	$(VENV)/python -m pytest -n $(RANKS) --dist loadfile
 	$(VENV)/pneunet run -n $(RANKS) -- python -m pytest -q -p no:cacheprovider tests/hifi tests/verification
 
 types: setup ## mypy and ruff

@@ -102,7 +102,11 @@ class Checked:
             value = getattr(self, field.name)
             if value is None and field.default is None:
                 continue
-            if isinstance(value, tuple) and all(isinstance(v, Real) for v in value):
+            if (
+                hasattr(value, "__len__")
+                and not isinstance(value, str)
+                and all(isinstance(v, Real) for v in value)
+            ):
                 value = math.hypot(*value)
             if factor != 1.0 and isinstance(value, Real):
                 value = rounded(value / factor)

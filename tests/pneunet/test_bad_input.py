@@ -176,8 +176,8 @@ DESIGNS = {
     ),
     "gravity": (
         "[material]",
-        "[loads]\ngravity_m_per_s2 = [0, 0, -1e300]\n[material]",
-        "[loads]: gravity_m_per_s2 = 1e+300 must lie in 0..10000 m/s2",
+        "[loads]\ngravity_m_per_s2 = [0, 0, -1e20]\n[material]",
+        "[loads]: gravity_m_per_s2 = 1e+20 must lie in 0..10000 m/s2",
     ),
     "tip force": (
         "[material]",
@@ -186,8 +186,8 @@ DESIGNS = {
     ),
     "origin": (
         "[material]",
-        "[base]\norigin_mm = [1e300, 0, 0]\n[material]",
-        "[base]: 'origin_mm' must be numbers of shape (3,), up to 1e+06 in size",
+        "[base]\norigin_mm = [1e20, 0, 0]\n[material]",
+        "[base]: 'origin_mm' must be numbers up to 1e+06 in size",
     ),
     "no pressure": ("pressure_kPa = 20", "pressure_kPa = 0", "pressure_kPa = 0 leaves nothing to solve"),
     "no material": ("[material]\nmu_MPa = 0.3", "", "key 'material' is missing"),
@@ -232,7 +232,7 @@ def test_design(folder, capsys, command, old, new, message):
             ["--mesh-size-mm: 'fine' must be a number in 0.1..20"],
         ),
         (["mesh", "good.toml", "--mesh-size-mm", "0.1"], ["mesh_size_mm = 0.1", "choose a coarser mesh"]),
-        (["mesh", "good.toml", "-o", "curve.csv"], ["curve.csv: cannot be written to", "-o"]),
+        (["mesh", "good.toml", "-o", "curve.csv"], ["curve.csv/mesh: cannot be written to", "-o"]),
         (["design", "target.toml", "-o", "curve.csv"], ["curve.csv: cannot be written to", "-o"]),
         (["fit-material", "none.csv"], ["none.csv: no such file"]),
         (["fit-material", "curve.csv"], ["curve.csv: no header with a strain"]),
@@ -244,7 +244,7 @@ def test_design(folder, capsys, command, old, new, message):
             ["fit-material", "curve.csv", "--to-strain-percent", "-5"],
             ["--to-strain-percent: '-5' must be a number larger than 0"],
         ),
-        (["run", "-n", "0", "solve", "good.toml"], ["-n 0: at least 1 rank"]),
+        (["run", "-n", "0", "solve", "good.toml"], ["-n 0: the number of ranks must be at least 1"]),
         (["run", "-n", "two", "solve", "good.toml"], ["-n", "'two'"]),
         (["run", "-n", "2"], ["no command given", "pneunet run -n 2 solve DESIGN.toml"]),
         (["desing", "target.toml"], ["'desing'", "design"]),
@@ -411,8 +411,8 @@ angle_deg = 60
 CELLS = {
     "held curvature": (
         "[material]",
-        "[held]\nk1_per_mm = 1e300\n[material]",
-        "k1_per_mm = 1e+300 must lie in -2..2",
+        "[held]\nk1_per_mm = 1e20\n[material]",
+        "k1_per_mm = 1e+20 must lie in -2..2",
     ),
     "held stretch": (
         "[material]",

@@ -338,7 +338,7 @@ BAD = {
     ),
     "tolerance": (lambda: MIXED.equilibrium(tolerance=0.0), "tolerance = 0 must lie in"),
     "first load": (lambda: MIXED.equilibrium(first_load=2.0), "first_load = 2 must lie in"),
-    "loads": (lambda: MIXED.equilibrium(DeadLoads((0, 0, np.nan))), "loads: give three finite numbers"),
+    "loads": (lambda: DeadLoads((0, 0, np.nan)), "gravity_m_per_s2 = nan must lie in"),
     "laws": (
         lambda: Rod.of(TestOfAManipulator.body, [law()] * 3, 0.0),
         "one for all or one for each of the 2 segments",
