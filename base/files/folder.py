@@ -79,8 +79,10 @@ def _take(handle):
         except OSError:
             raise BlockingIOError from None
     else:
-        import fcntl
-
+        try:
+            import fcntl
+        except ModuleNotFoundError:  # a system without locks: there a run is not kept from another's folder
+            return
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
