@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.kills import COMMANDS, survived
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.files.schemas import CENTRELINES, SEGMENTS, STEPS
@@ -269,3 +270,8 @@ def test_a_full_disk_ends_in_one_line(whole, tmp_path, ranks, limit, options):
         and "Traceback" not in failed.stderr
     )
     assert not list((tmp_path / "solve").glob(".*"))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_run_killed_at_a_random_moment_runs_again_as_if_nothing_had_been(command):
+    assert survived(command, 1) == [True]
