@@ -1,11 +1,8 @@
 """Inputs that are bad for certain, made from good ones by a seed: for every door of the command line.
 
-Each is a command and the files that differ from `good_files`. What a change might leave valid is not among
-the changes.
+Each is a command and the files that differ from `good_files`; no change may leave them valid.
 """
 
-import io
-import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
@@ -13,12 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.bad_archives import changed_archive
+from benchmarks.strange_files import Content, Random, pick, strange
 from pneunet.base.files.toml import toml_text
-from pneunet.reduced.choice import DATA, SHIPPED
-
-Random = np.random.Generator
-#: bytes, or what is no regular file: ("pipe",), ("folder",), ("link", where to), ("size", bytes), ("none",)
-Content = bytes | tuple
 
 
 @dataclass(frozen=True)
@@ -135,34 +129,6 @@ def bad_inputs(number: int, seed: int = 1) -> Iterator[BadInput]:
         yield makers[i % len(makers)](random)
 
 
-def _pick(random: Random, things: Any) -> Any:
-    return things[int(random.integers(len(things)))]
-
-
-# ---- files of any kind
-
-STRANGE = {
-    "a pipe": ("pipe",),
-    "a folder": ("folder",),
-    "a device": ("link", "/dev/zero"),
-    "a link to itself": ("link", "LINK"),
-    "3 GB": ("size", 3 << 30),
-    "nothing there": ("none",),
-    "empty": b"",
-    "zeros": b"\0" * 5000,
-    "a picture": b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 10,
-    "an archive": b"PK\x03\x04" + bytes(range(256)) * 10,
-    "a program": b"\x7fELF" + bytes(range(256)),
-}
-
-
-def _strange(random: Random) -> tuple[Content, str]:
-    if random.random() < 0.3:
-        return b"\0" + random.bytes(int(random.integers(1, 3000))), "random bytes"
-    what = _pick(random, sorted(STRANGE))
-    return STRANGE[what], what
-
-
 # ---- TOML
 
 #: in the place of a number
@@ -228,17 +194,17 @@ def _copy(value: Any) -> Any:
 
 def _bad_value(random: Random, key: Any, value: Any) -> str:
     if isinstance(value, bool):
-        return _pick(random, NO_BOOLEANS)
+        return pick(random, NO_BOOLEANS)
     if isinstance(value, (int, float)):
-        return _pick(random, NO_NUMBERS)
+        return pick(random, NO_NUMBERS)
     if isinstance(value, list):
-        return _pick(random, NO_LISTS)
-    return _pick(random, (*NO_TEXTS, '"nonsense"', '""') if key in CHOICES else NO_TEXTS)
+        return pick(random, NO_LISTS)
+    return pick(random, (*NO_TEXTS, '"nonsense"', '""') if key in CHOICES else NO_TEXTS)
 
 
 def _bad_toml(random: Random, name: str) -> BadInput:
     content, what = _changed_toml(random, name)
-    arguments = list(_pick(random, DOORS[name]))
+    arguments = list(pick(random, DOORS[name]))
     arguments.insert(1, name)
     return BadInput(name, tuple(arguments), {name: content}, what)
 
@@ -246,7 +212,7 @@ def _bad_toml(random: Random, name: str) -> BadInput:
 def _changed_toml(random: Random, name: str) -> tuple[Content, str]:
     tables, way = _copy(GOOD_TABLES[name]), random.random()
     if way < 0.55:
-        path, value = _pick(random, list(_leaves(tables)))
+        path, value = pick(random, list(_leaves(tables)))
         parent = tables
         for step in path[:-1]:
             parent = parent[step]
@@ -256,20 +222,20 @@ def _changed_toml(random: Random, name: str) -> tuple[Content, str]:
         return toml_text(tables).replace(f'"{PLACE}"', bad).encode(), told
     text = toml_text(tables)
     if way < 0.7:
-        key = _pick(random, KEYS)
+        key = pick(random, KEYS)
         places = [0, *(i + 1 for i, c in enumerate(text) if c == "\n" and text[i - 1] == "]")]
-        at = _pick(random, [p for p in places if "result" not in text[:p].rpartition("[")[2]])
+        at = pick(random, [p for p in places if "result" not in text[:p].rpartition("[")[2]])
         return f"{text[:at]}{key} = 1\n{text[at:]}".encode(), f"key {key[:40]}"
     if way < 0.78 and NEEDED[name]:
-        key = _pick(random, NEEDED[name])
+        key = pick(random, NEEDED[name])
         return toml_text({k: v for k, v in tables.items() if k != key}).encode(), f"no {key}"
     if way < 0.88:
-        at = _pick(random, [i for i, c in enumerate(text) if c == "="])
-        end = _pick(random, (b"", b'"', b"'''", b"[", b"\x00", b"\xff\xfe", b"= ="))
+        at = pick(random, [i for i, c in enumerate(text) if c == "="])
+        end = pick(random, (b"", b'"', b"'''", b"[", b"\x00", b"\xff\xfe", b"= ="))
         return text[: at + 1].encode() + end, f"ends after byte {at}"
     if way < 0.92:
-        return text.encode(_pick(random, ("utf-16", "utf-32"))), "another encoding"
-    return _strange(random)
+        return text.encode(pick(random, ("utf-16", "utf-32"))), "another encoding"
+    return strange(random)
 
 
 # ---- CSV
@@ -299,17 +265,17 @@ NO_CELLS = (
 def _bad_numbers(random: Random, name: str) -> BadInput:
     content, what = _changed_numbers(random, TABLES_OF_NUMBERS[name])
     through = name if name == "tensile.csv" or random.random() < 0.5 else "target.toml"
-    return BadInput(name, (*_pick(random, DOORS[name]), through), {name: content}, what)
+    return BadInput(name, (*pick(random, DOORS[name]), through), {name: content}, what)
 
 
 def _changed_numbers(random: Random, lines: list[str]) -> tuple[Content, str]:
     rows, way = [line.split(",") for line in lines], random.random()
     if way < 0.55:
         i, j = int(random.integers(2, len(rows) - 1)), int(random.integers(len(rows[0])))
-        cell = rows[i][j] = _pick(random, NO_CELLS)
+        cell = rows[i][j] = pick(random, NO_CELLS)
         what = f"cell {cell[:20]!r}"
     elif way < 0.65:
-        rows[0] = _pick(random, (["a"] * len(rows[0]), ["x_m", *rows[0][1:]], [rows[0][0]] * len(rows[0])))
+        rows[0] = pick(random, (["a"] * len(rows[0]), ["x_m", *rows[0][1:]], [rows[0][0]] * len(rows[0])))
         what = f"header {rows[0]}"
     elif way < 0.72:
         rows, what = rows[:3], "two rows"
@@ -319,19 +285,11 @@ def _changed_numbers(random: Random, lines: list[str]) -> tuple[Content, str]:
     elif way < 0.85:
         return "\n".join(lines).encode("utf-16-le"), "UTF-16 without a mark"
     else:
-        return _strange(random)
+        return strange(random)
     return "\n".join(map(",".join, rows)).encode(), what
 
 
 # ---- archives
-
-
-@cache
-def archive(name: str) -> dict[str, np.ndarray]:
-    """The arrays of the law or of the smallest data set that come along."""
-    with np.load(SHIPPED if name == "law.npz" else DATA / "cells-slanted-v1.npz") as stored:
-        return dict(stored)
-
 
 OF_ARCHIVES = {
     "law.npz": (
@@ -345,74 +303,8 @@ OF_ARCHIVES = {
 
 
 def _bad_archive(random: Random, name: str) -> BadInput:
-    content, what = _changed_archive(random, name)
-    return BadInput(name, _pick(random, OF_ARCHIVES[name]), {name: content}, what)
-
-
-def _changed_archive(random: Random, name: str) -> tuple[Content, str]:
-    arrays, way = dict(archive(name)), random.random()
-    member = _pick(random, sorted(arrays))
-    values, what = arrays[member], f"member {member}"
-    if way < 0.15:
-        return _strange(random)
-    if way < 0.25:
-        whole = _packed(arrays)
-        return whole[: int(random.integers(len(whole) - 30))], "cut short"
-    if way < 0.35:  # in the middle of an array's data
-        whole = bytearray(_packed({member: values}))
-        at = int(random.integers(len(whole)))
-        whole[at:] = bytes(len(whole) - at)
-        return bytes(whole), "zeros from the middle on"
-    if way < 0.45:
-        table = (
-            b"[]",
-            b"{}",
-            b"[" * 3000,
-            b"\xff",
-            b'{"schema": 5}',
-            b'{"schema": "pneunet-law-1", "kinds": 3}',
-        )
-        arrays["about"] = np.frombuffer(_pick(random, table), np.uint8)
-        what = "member about"
-    elif way < 0.55:
-        del arrays[member]
-    elif way < 0.65:
-        arrays[member] = values.astype(complex)
-    elif way < 0.72:
-        arrays[member] = np.array(["a"] * max(len(values.ravel()), 1))
-    elif way < 0.8:
-        arrays[member] = np.broadcast_to(values, (2, *values.shape))
-    elif way < 0.85:
-        return _bomb(member), f"{what}: 100 GB by its header"
-    else:
-        member = _pick(
-            random,
-            sorted(k for k, v in arrays.items() if v.dtype.kind == "f" and v.size and "slopes" not in k),
-        )
-        if member in ("limit_pressure", "first_touch", "wall_distance"):
-            member = "strains"
-        values = arrays[member].astype(float)
-        values.flat[int(random.integers(values.size))] = _pick(random, (np.nan, np.inf, 1e300))
-        arrays[member], what = values, f"nan or more in {member}"
-    return _packed(arrays), what
-
-
-def _packed(arrays: dict[str, np.ndarray]) -> bytes:
-    stream = io.BytesIO()
-    np.savez(stream, **arrays)
-    return stream.getvalue()
-
-
-def _bomb(member: str) -> bytes:
-    """A small archive whose member claims to be huge."""
-    stream = io.BytesIO()
-    header = io.BytesIO()
-    about = {"descr": "<f8", "fortran_order": False, "shape": (10**10,)}
-    np.lib.format.write_array_header_1_0(header, about)
-    with zipfile.ZipFile(stream, "w") as packed:
-        packed.writestr("about.npy", header.getvalue())
-        packed.writestr(f"{member}.npy", header.getvalue() + bytes(100))
-    return stream.getvalue()
+    content, what = changed_archive(random, name)
+    return BadInput(name, pick(random, OF_ARCHIVES[name]), {name: content}, what)
 
 
 # ---- folders
@@ -421,7 +313,7 @@ def _bomb(member: str) -> bytes:
 def _bad_folder(random: Random) -> BadInput:
     """A folder of a design whose design.toml is bad, or none."""
     if random.random() < 0.2:
-        place = _pick(random, ("nowhere", "design.toml", "folder/none", "x" * 300, "/dev/null"))
+        place = pick(random, ("nowhere", "design.toml", "folder/none", "x" * 300, "/dev/null"))
         return BadInput("report", ("report", place), {}, f"folder {place[:20]}")
     content, what = _changed_toml(random, "design.toml")
     return BadInput("report", ("report", "folder"), {"folder/design.toml": content}, what)
@@ -483,17 +375,17 @@ MORE_ARGUMENTS = (
 
 
 def _bad_arguments(random: Random) -> BadInput:
-    line, way = list(_pick(random, GOOD_LINES)), random.random()
+    line, way = list(pick(random, GOOD_LINES)), random.random()
     options = [i for i, word in enumerate(line) if word in NO_ARGUMENTS]
     if way < 0.5 and options:
-        at = _pick(random, options)
-        line[at + 1] = _pick(random, NO_ARGUMENTS[line[at]])
+        at = pick(random, options)
+        line[at + 1] = pick(random, NO_ARGUMENTS[line[at]])
         what = f"{line[at]} {line[at + 1][:20]!r}"
     elif way < 0.6:
-        line[0] = _pick(random, ("", "desing", "Solve", "solve ", "--", "\x1b[2J", "x" * 5000, "0"))
+        line[0] = pick(random, ("", "desing", "Solve", "solve ", "--", "\x1b[2J", "x" * 5000, "0"))
         what = f"command {line[0][:20]!r}"
     elif way < 0.75 and len(line) > 1 and line[0] != "run":
-        line[1] = _pick(
+        line[1] = pick(
             random,
             ("none.toml", "", ".", "folder", "x" * 300, "a\x00b.toml", "/dev/zero", "/" * 5000, "\x1b.toml"),
         )
@@ -502,7 +394,7 @@ def _bad_arguments(random: Random) -> BadInput:
         what = f"file {line[1][:20]!r}"
     else:
         line.insert(
-            int(random.integers(1, len(line) + 1)) if line[0] != "run" else 1, _pick(random, MORE_ARGUMENTS)
+            int(random.integers(1, len(line) + 1)) if line[0] != "run" else 1, pick(random, MORE_ARGUMENTS)
         )
         what = f"{line}"[:60]
     return BadInput("arguments", tuple(line), {}, what)
