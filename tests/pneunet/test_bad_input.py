@@ -193,7 +193,7 @@ DESIGNS = {
     "origin": (
         "[material]",
         "[base]\norigin_mm = [1e20, 0, 0]\n[material]",
-        "[base]: 'origin_mm' must be numbers of shape (3,), up to 1e+06 in size",
+        "[base]: 'origin_mm' must be numbers up to 1e+06 in size",
     ),
     "no pressure": ("pressure_kPa = 20", "pressure_kPa = 0", "pressure_kPa = 0 leaves nothing to solve"),
     "no material": ("[material]\nmu_MPa = 0.3", "", "key 'material' is missing"),
