@@ -7,11 +7,11 @@ import numpy as np
 
 from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import write_text
+from pneunet.base.files.kinds import DESIGN, read_tables
 from pneunet.base.files.toml import (
     array,
     as_table,
     from_table,
-    read_toml,
     refuse_unknown,
     to_table,
     toml_text,
@@ -62,7 +62,7 @@ KEYS = ("schema", *quantities(DesignFile), *CONTROL_KEYS, *TABLES)
 
 def read_design_file(path: str | Path) -> DesignFile:
     """The DesignFile in a TOML file; InputError with file, table and key otherwise."""
-    return design_from_tables(read_toml(path), str(path))
+    return design_from_tables(read_tables(path, DESIGN), str(path))
 
 
 def design_from_tables(data: dict, path: str) -> DesignFile:
@@ -103,6 +103,7 @@ def segment_from_table(
 ) -> Segment:
     """The Segment in a TOML table, its materials the ones given unless it has its own."""
     row = as_table(row, where)
+    refuse_unknown(row, [*quantities(Segment), "material", "layer_material"], where)
     own = row.pop("material", None)
     if own is not None:
         material = material_from_table(own, f"{where} material")

@@ -75,14 +75,19 @@ def refuse_unknown(table: object, known: Collection[str], where: str) -> None:
     for key in as_table(table, where):
         if key in known:
             continue
-        same_quantity = [
-            k for k in known if k.rsplit("_", 1)[0] == key.rsplit("_", 1)[0] or k.startswith(key + "_")
-        ]
-        near = same_quantity or difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-        if same_quantity:
-            raise InputError(f"{where}: key '{key}' has the wrong unit: write '{near[0]}'")
-        hint = f"did you mean '{near[0]}'?" if near else f"known keys: {', '.join(sorted(known))}"
+        for k in known:
+            if k.rsplit("_", 1)[0] == key.rsplit("_", 1)[0] or k.startswith(key + "_"):
+                raise InputError(f"{where}: key '{key}' has the wrong unit: write '{k}'")
+        nearness, near = max((_nearness(key, k), k) for k in known)
+        hint = f"did you mean '{near}'?" if nearness >= 0.5 else f"known keys: {', '.join(sorted(known))}"
         raise InputError(f"{where}: unknown key '{key}': {hint}")
+
+
+def _nearness(key, known):
+    """Of two keys, 0 to 3: whole words in common count twice as much as letters."""
+    own, other = set(key.split("_")), set(known.split("_"))
+    words = len(own & other) / len(own | other)
+    return 2 * words + difflib.SequenceMatcher(None, key, known).ratio()
 
 
 def number(value: Any, key: str, where: str, integer: bool = False) -> Any:

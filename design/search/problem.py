@@ -110,7 +110,7 @@ class Problem:
         misfits = [0.0]
         for piece, segment, count in zip(self.pieces, trial.segments, trial.counts):
             if not piece.twist_seen:
-                turned = self.law.strains(segment, trial.pressure).k[0] * count * segment.pitch
+                turned = self.law.each([segment], trial.pressure).k[0, 0] * count * segment.pitch
                 misfits.append(segment.width / 2 * (turned - piece.twist * piece.length))
         return np.array(misfits)
 

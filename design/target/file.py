@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.files.kinds import TARGET, read_tables
 from pneunet.base.files.schemas import POINT
 from pneunet.base.files.text import read_numbers_table
 from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown
@@ -124,7 +125,7 @@ KEYS = (
 
 
 def _from_toml(path):
-    table = read_toml(path)
+    table = read_tables(path, TARGET)
     refuse_unknown(table, KEYS, str(path))
     folder = path.parent
     if "target" in table:

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown, to_table
+from pneunet.base.files.kinds import CELL, read_tables
+from pneunet.base.files.toml import as_table, from_table, refuse_unknown, to_table
 from pneunet.base.materials.laws import material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
@@ -69,7 +70,7 @@ KEYS = (*quantities(CellCase), "material", "layer_material", "segment", "held")
 
 def read_cell(path: str | Path) -> CellCase:
     """The CellCase in a TOML file; InputError with file, table and key otherwise."""
-    return cell_from_tables(read_toml(path), str(path))
+    return cell_from_tables(read_tables(path, CELL), str(path))
 
 
 def cell_from_tables(data: dict[str, Any], where: str) -> CellCase:

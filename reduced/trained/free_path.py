@@ -108,10 +108,16 @@ class FreePath:
         everywhere[:, LEAD], everywhere[:, OVERLAP] = np.log(lead + SMALL_STRAIN), co.overlap_input(overlap)
         return lead, beyond * (beyond > ABOVE), everywhere
 
+    def strains_and_end(
+        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(free strains (n, 6), log P beyond the path's end (n,))."""
+        lead, beyond, x = self.at(shape, pressure, level)
+        return self.coordinates.strains(shape, lead, self.learned.rest(x)), beyond
+
     def strains(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
         """(n, 6) free strains."""
-        lead, _, x = self.at(shape, pressure, level)
-        return self.coordinates.strains(shape, lead, self.learned.rest(x))
+        return self.strains_and_end(shape, pressure, level)[0]
 
     def _slopes(self, shape, pressure, level):
         """(lead (n,), path_inputs x, ratios (n, p - 1), derivatives of what is learned: by the shape numbers

@@ -5,6 +5,7 @@ A section is in mm and MPa; everything else is without dimension (base.files.dat
 train` (reduced.training.train), stored by reduced.trained.file.
 """
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -39,6 +40,7 @@ SILICONES = "strains of fitted silicones differed by up to 1.2 % at P/mu = 0.1 a
 ROUNDED = 1e-3
 #: lowest P/mu, whose logarithm is taken
 LOWEST = 1e-9
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,17 @@ class TrainedLaw(SegmentLaw):
         law, shape, pitch = self._kind(segment), shape_numbers(segment), normal_pitch(segment)
         return TrainedSection(law, shape, pitch, segment.material.mu, _ties(segment))
 
+    def strains(self, segment: Segment, pressure: float | ArrayLike) -> RodStrains:
+        """As SegmentLaw.strains; that a pressure lies beyond the end of the law's path is logged."""
+        section, P = self.of(segment), checked_pressure(pressure)
+        shape, p = section._rows(P)
+        found, beyond = self._kind(segment).path.strains_and_end(
+            shape, np.maximum(p, LOWEST), section.law.level
+        )
+        if beyond.any():
+            log.warning(f"warning: {section.told_end(p, beyond)}")
+        return RodStrains.of_vector((found / section._scale).reshape(*P.shape, 6))
+
     def table(self, segments: Sequence[Segment], pressures: ArrayLike) -> RodStrains:
         """RodStrains (n, m, 3) of n segments at pressures (m,) in MPa, all at once."""
         pressures = checked_pressure(pressures)
@@ -229,12 +242,15 @@ class TrainedSection:
         if excess[:, -2].max() > 0 and not reasons:
             reasons = ["the trained law knows no design near this one"]
         if excess[:, -1].max() > 0:
-            limit = self.mu * (p * np.exp(-excess[:, -1]))[excess[:, -1] > 0].min()
-            reasons.append(
-                f"the trained law sees a limit load, or no further, at {KPA_PER_MPA * limit:.3g} kPa: strains"
-                " are those there"
-            )
+            reasons.append(self.told_end(p, excess[:, -1]))
         return self.remarks + tuple(reasons)
+
+    def told_end(self, p: np.ndarray, beyond: np.ndarray) -> str:
+        """Where the path ends, for P/mu (n,) that are in part `beyond` it by log P (n,)."""
+        limit = KPA_PER_MPA * self.mu * (p * np.exp(-beyond))[beyond > 0].min()
+        return (
+            f"the trained law sees a limit load, or no further, at {limit:.3g} kPa: strains are those there"
+        )
 
     def _state(self, q, P):
         """(shape of the answer, v (n, 6), M (n, 6, 6), D1 (n,), anharmonic tensors)."""

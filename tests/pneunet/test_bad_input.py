@@ -150,6 +150,12 @@ DESIGNS = {
         "angel_deg",
         "[[segment]] 1: unknown key 'angel_deg': did you mean 'angle_deg'?",
     ),
+    "a word of the key": (
+        "chambers = 2",
+        "chambers = 2\nwall_thickness_mm = 1",
+        "unknown key 'wall_thickness_mm': did you mean 'wall_mm'?",
+    ),
+    "known keys": ("chambers = 2", "chambers = 2\nqqq = 1", ", material, "),
     "wrong unit": (
         "pressure_kPa = 20",
         "pressure_bar = 0.2",
@@ -214,7 +220,15 @@ def test_design(folder, capsys, command, old, new, message):
         (["shape", "none.toml"], ["none.toml: no such file"]),
         (["mesh", "."], [".: is a folder: give the file in it"]),
         (["solve", "none.toml"], ["none.toml: no such file"]),
-        (["solve", "curve.csv"], ["curve.csv: not valid TOML"]),
+        (
+            ["solve", "curve.csv"],
+            ["is a table, perhaps a target: run pneunet design curve.csv first"],
+        ),
+        (["solve", "target.toml"], ["target.toml: is a target, not a design: run pneunet design first"]),
+        (["design", "good.toml"], ["good.toml: is a design, not a target: run pneunet shape, mesh or solve"]),
+        (["cell", "good.toml"], ["good.toml: is a design, not a unit cell"]),
+        (["study", "target.toml"], ["target.toml: is a target, not a study: run pneunet design"]),
+        (["campaign", "curve.csv"], ["curve.csv: is a table, not a campaign"]),
         (["report", "none"], ["none: holds no design.toml", "pneunet design -o"]),
         (["report", "."], ["holds no design.toml"]),
         (
@@ -234,6 +248,7 @@ def test_design(folder, capsys, command, old, new, message):
         (["mesh", "good.toml", "--mesh-size-mm", "0.1"], ["mesh_size_mm = 0.1", "choose a coarser mesh"]),
         (["mesh", "good.toml", "-o", "curve.csv"], ["curve.csv/mesh: cannot be written to", "-o"]),
         (["design", "target.toml", "-o", "curve.csv"], ["curve.csv: cannot be written to", "-o"]),
+        (["design", "target.toml", "-o", f"/proc/{2**22}/out"], ["out: cannot be written to (", "-o"]),
         (["fit-material", "none.csv"], ["none.csv: no such file"]),
         (["fit-material", "curve.csv"], ["curve.csv: no header with a strain"]),
         (

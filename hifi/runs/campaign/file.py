@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from pneunet.base.errors import InputError, located
-from pneunet.base.files.toml import as_table, from_table, number, read_toml, refuse_unknown, to_table
+from pneunet.base.files.kinds import CAMPAIGN, read_tables
+from pneunet.base.files.toml import as_table, from_table, number, refuse_unknown, to_table
 from pneunet.base.materials.laws import material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.system.processes import Limits
@@ -95,7 +96,7 @@ class Campaign:
 
 def read_campaign(path: str | Path) -> Campaign:
     """The Campaign in a TOML file; InputError that names key and fix otherwise."""
-    data, where = read_toml(path), str(path)
+    data, where = read_tables(path, CAMPAIGN), str(path)
     if not data:
         raise InputError(f"{where}: is empty: write at least designs = {Numbers.designs}")
     refuse_unknown(data, KEYS, where)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pneunet.base.errors import InputError
+from pneunet.base.files.kinds import STUDY, read_tables
 from pneunet.base.files.toml import as_table, from_table, read_toml, refuse_unknown
 from pneunet.base.materials.laws import LAWS
 from pneunet.base.quantities import Checked, quantities, quantity
@@ -70,7 +71,7 @@ def read_study(path: str | Path) -> Study:
     A combination of the grid that is no valid body is kept with its refusal, a listed case or a whole grid of
     them is an error.
     """
-    data, where = read_toml(path), str(path)
+    data, where = read_tables(path, STUDY), str(path)
     for key, fix in (
         ("kind", "write 'cell', 'segment' or 'manipulator'"),
         ("base", 'write the body as [base], or base = "FILE.toml"'),
