@@ -1,6 +1,6 @@
 """Numbers that no move of code may change: `python -m tests.reference_outputs OUT.json` writes them.
 
-hifi/verification/data/reference_outputs.json was written before the packages were moved under one name.
+tests/data/reference_outputs.json was written before the packages were moved under one name.
 """
 
 import json
