@@ -42,14 +42,13 @@ class Design:
     """What to cast, and at what pressure.
 
     content: what design.toml says. law: what predicts. target: what was wanted, if anything was.
-    active_bounds, widened_ranges: of the search, in words. effort: what run.json says of the search.
+    active_bounds: of the search, in words. effort: what run.json says of the search.
     """
 
     content: DesignFile
     law: SegmentLaw = field(default_factory=choose_law)
     target: Target | None = None
     active_bounds: tuple[str, ...] = ()
-    widened_ranges: tuple[str, ...] = ()
     effort: dict = field(default_factory=dict)
 
     @classmethod
@@ -86,7 +85,6 @@ class Design:
             chosen_law(folder.law if law is None else law),
             None if folder.target is None else Target(folder.target, content.name),
             tuple(told.get("active_bounds", ())),
-            tuple(told.get("grown_ranges", ())),
             {key: folder.record[key] for key in EFFORT if key in folder.record},
         )
 

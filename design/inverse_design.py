@@ -14,7 +14,7 @@ from pneunet.base.strains import RodStrains
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.search.doubts import WARN, WAYS, tell_doubts
 from pneunet.design.search.inverse import search
-from pneunet.design.search.problem import OBJECTIVES, PAIRED
+from pneunet.design.search.aims import OBJECTIVES, PAIRED
 from pneunet.design.target.extraction import Extracted, extract, rates
 from pneunet.design.target.segmentation import NOTE, split
 from pneunet.design.target.target import Target
@@ -64,7 +64,7 @@ def inverse_design(
         "evaluations": found.evaluations,
         "wall_seconds": round(time.perf_counter() - started, 2),
     }
-    design = Design(content, law, target, tuple(found.active), tuple(found.grown), effort)
+    design = Design(content, law, target, found.active, effort)
     tell_doubts(design.doubts, law, outside)
     content.result.update(
         {
@@ -73,7 +73,7 @@ def inverse_design(
             "law": law.name,
             "doubts": list(design.doubts),
             "active_bounds": list(found.active),
-            "grown_ranges": list(found.grown),
+            "flush_underside_costs_mm": round(found.flush_costs, 4),
             "target_error": design.errors.table() if design.errors else {},
             "piece": [
                 {**piece.table(), "predicted": predicted(piece.kind, RodStrains(e, k))}
@@ -139,8 +139,6 @@ def summary(design: Design) -> Iterator[str]:
     if design.errors:
         yield "errors of the reduced prediction:"
         yield from ("  " + text for text in design.errors.lines())
-    if design.widened_ranges:
-        yield "ranges that were widened: " + "; ".join(design.widened_ranges)
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
 
 

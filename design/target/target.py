@@ -9,6 +9,7 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic
+from pneunet.design.target.casting import Casting
 from pneunet.geometry.designfile import FARTHEST
 
 #: kinds of pieces; straight ones are TWISTING, as the segments are that follow them
@@ -38,7 +39,7 @@ class Target:
     frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); pieces: the
     split; base_direction, base_width (3,): unit vectors that fix the base (width None = its roll stays free);
     pressure_range (low, high) in MPa, equal = fixed; material; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice; source: name of the file that it was read from.
+    Segment: (low, high)} or None for the default choice; casting: how it is cast; source: name of the file that it was read from.
     """
 
     points: np.ndarray
@@ -51,6 +52,7 @@ class Target:
     material: Hyperelastic = PAPER_TWISTING
     start: dict = field(default_factory=dict)
     vary: dict[str, tuple[float, float]] | None = None
+    casting: Casting = field(default_factory=Casting)
     source: str = ""
 
     @classmethod

@@ -7,6 +7,7 @@ state, its gradient is (force, moment) in the section frame.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -16,6 +17,10 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.parameters import Segment
+from pneunet.geometry.shape_numbers import SHAPE
+
+#: degrees and mm, and of the pressure: of laws without slopes of their own
+DIFFERENCE = 1e-4
 
 
 @runtime_checkable
@@ -90,6 +95,33 @@ class SegmentLaw(ABC):
                 except ConvergenceError:
                     break
         return RodStrains.of_vector(q)
+
+    def each_with_slopes(
+        self, segments: Sequence[Segment], pressure: float | ArrayLike
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(strains (n, 6) as `each` gives them, their derivatives (n, 6, 14) by the lengths of SHAPE, in
+        degrees and mm, and by the pressure in MPa); here by central differences."""
+        pressures = np.broadcast_to(np.asarray(pressure, float), len(segments))
+        slopes = np.zeros((len(segments), 6, len(SHAPE) + 1))
+        for i, (segment, P) in enumerate(zip(segments, pressures)):
+            for j, name in enumerate(SHAPE):
+                slopes[i, :, j] = self._slope(segment, P, name)
+            step = DIFFERENCE * max(P, DIFFERENCE)
+            low, high = (self.strains(segment, P + d).vector for d in (-step, step))
+            slopes[i, :, -1] = (high - low) / (2 * step)
+        return self.each(segments, pressures).vector, slopes
+
+    def _slope(self, segment, pressure, name):
+        """(6,) derivative by one of SHAPE; 0 where the segment cannot be changed in it, one-sided where only
+        that can be."""
+        value, found = getattr(segment, name), []
+        for step in (-DIFFERENCE, DIFFERENCE):
+            try:
+                found.append((step, self.strains(replace(segment, **{name: value + step}), pressure).vector))
+            except (InputError, ConvergenceError):
+                found.append((0.0, self.strains(segment, pressure).vector))
+        (low, before), (high, after) = found
+        return (after - before) / (high - low) if high > low else np.zeros(6)
 
     def excess(self, segment: Segment, pressure: float) -> np.ndarray:
         """How far (0: not at all) the segment lies outside what the law knows, (d,) in widths of that."""

@@ -24,6 +24,8 @@ from pneunet.reduced.trained.side_by_side import SideBySide
 #: (measured: at most 5e-5 in the leading strain, a hundredth of the law's error); the longest; how many.
 #: (Slopes next to a limit load count as FLAT there: at most 4e-6.)
 NEAR, LONGEST, MOST = 0.07, 0.7, 20
+#: the same where slopes are asked for, so that they are those of the strains to 1e-7
+NEAR_OF_SLOPES = 0.002
 #: of d log P/d log(leading strain), from there on next to a limit load: derivatives and deviations are no
 #: larger than there
 FLAT = 0.02
@@ -58,14 +60,14 @@ class FreePath:
         return AlongInputs(self.learned.processes[0], [LEAD, OVERLAP])
 
     def at(
-        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray
+        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray, near: float = NEAR
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(leading strain (n,), log P beyond the path's end (n,), 0 up to it, path_inputs (n, d)) at shape
         numbers (n, 13), P/mu (n,) > 0 and the mesh's level, (n,) or a number. A path ends at its limit load,
         or where it leaves what is known."""
         if len(shape) > ROWS:
             each = shape, pressure, np.broadcast_to(level, len(shape))
-            parts = [self.at(*(a[i : i + ROWS] for a in each)) for i in range(0, len(shape), ROWS)]
+            parts = [self.at(*(a[i : i + ROWS] for a in each), near) for i in range(0, len(shape), ROWS)]
             leads, ends, path_inputs = map(np.concatenate, zip(*parts))
             return leads, ends, path_inputs
         co, last = self.coordinates, self._last
@@ -99,7 +101,7 @@ class FreePath:
             then = over + moved * (over_slope + moved / 2 * over_curvature)
             found[searched], overlap[searched] = v, then
             beyond[searched] = missing * ((slope < FLAT) | (v >= last))
-            far = (np.abs(step) * pace > NEAR * np.maximum(slope, FLAT)) | (touch != (then > 0))
+            far = (np.abs(step) * pace > near * np.maximum(slope, FLAT)) | (touch != (then > 0))
             if not far.any():
                 break
             searched = np.arange(len(found))[searched][far]
@@ -123,7 +125,7 @@ class FreePath:
         """(lead (n,), path_inputs x, ratios (n, p - 1), derivatives of what is learned: by the shape numbers
         and P/mu at a leading strain (n, p, 14), by the leading strain (n, p), d log P/d log(lead) (n,) at
         least FLAT)."""
-        lead, _, x = self.at(shape, pressure, level)
+        lead, _, x = self.at(shape, pressure, level, NEAR_OF_SLOPES)
         learned, slopes = self.learned.with_slopes(x)
         over, over_by, over_by_lead = self.closing.overlap_and_slopes(shape, pressure, lead)
         by_overlap = slopes[:, :, OVERLAP] * self.coordinates.overlap_input_slope(over)[:, None]

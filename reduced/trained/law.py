@@ -18,7 +18,7 @@ from pneunet.base.materials.laws import NeoHookean
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.parameters import TWISTING, Segment
-from pneunet.geometry.shape_numbers import normal_pitch, shape_numbers, shapes_of
+from pneunet.geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers, shapes_of
 from pneunet.reduced.rod.laws import SegmentLaw, checked_pressure
 from pneunet.reduced.trained.coordinates import Coordinates, cosine
 from pneunet.reduced.trained.enthalpy import (
@@ -40,6 +40,8 @@ SILICONES = "strains of fitted silicones differed by up to 1.2 % at P/mu = 0.1 a
 ROUNDED = 1e-3
 #: lowest P/mu, whose logarithm is taken
 LOWEST = 1e-9
+#: (13,) derivatives of the normal pitch by SHAPE
+_PITCH = np.array([{"cavity_thickness": 1.0, "wall": 2.0, "gap": 1.0}.get(name, 0.0) for name in SHAPE])
 log = logging.getLogger(__name__)
 
 
@@ -159,15 +161,33 @@ class TrainedLaw(SegmentLaw):
         found = self._at(segments, np.broadcast_to(checked_pressure(pressure), len(segments))[:, None])
         return RodStrains(found.e[:, 0], found.k[:, 0])
 
+    def each_with_slopes(
+        self, segments: Sequence[Segment], pressure: float | ArrayLike
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As SegmentLaw.each_with_slopes, exact."""
+        shape, pitch = shapes_of(segments)
+        mu = np.array([s.material.mu for s in segments])
+        P = np.broadcast_to(checked_pressure(pressure), len(segments)) / mu
+        q, slopes = np.empty((len(segments), 6)), np.empty((len(segments), 6, shape.shape[1] + 1))
+        for rows in _alike(segments):
+            law = self._kind(segments[rows[0]])
+            q[rows], slopes[rows] = law.free_strains_and_slopes(shape[rows], P[rows])
+        # lengths count in pitches, and so do curvatures
+        slopes[:, :, 1:-1] /= pitch[:, None, None]
+        slopes[:, :, -1] /= mu[:, None]
+        by_pitch = -np.einsum("nij,nj->ni", slopes[:, :, 1:-1], shape[:, 1:])
+        q[:, 3:] /= pitch[:, None]
+        slopes[:, 3:] /= pitch[:, None, None]
+        by_pitch[:, 3:] = (by_pitch[:, 3:] - q[:, 3:]) / pitch[:, None]
+        slopes[:, :, :-1] += by_pitch[:, :, None] * _PITCH
+        return q, slopes
+
     def _at(self, segments: Sequence[Segment], pressures: np.ndarray) -> RodStrains:
         """RodStrains (n, m, 3) at pressures (n, m)."""
         (shape, pitch), m = shapes_of(segments), pressures.shape[1]
         P = pressures / np.array([s.material.mu for s in segments])[:, None]
         q = np.empty((*P.shape, 6))
-        alike: dict[str, list[int]] = {}
-        for i, segment in enumerate(segments):
-            alike.setdefault(segment.kind, []).append(i)
-        for rows in alike.values():
+        for rows in _alike(segments):
             law = self._kind(segments[rows[0]])
             q[rows] = law.free_strains(shape[rows].repeat(m, axis=0), P[rows].ravel()).reshape(-1, m, 6)
         return RodStrains(q[..., :3], q[..., 3:] / pitch[:, None, None])
@@ -285,6 +305,14 @@ class TrainedSection:
         by_v = D1[:, None, None] * (np.eye(6) + anharmonic_hessian(v, tensors))
         K = np.swapaxes(M, 1, 2) @ by_v @ M
         return (self.mu * self.length**2 * K * np.outer(self._scale, self._scale)).reshape(*lead, 6, 6)
+
+
+def _alike(segments):
+    """Lists of the places of segments of one kind."""
+    alike: dict[str, list[int]] = {}
+    for i, segment in enumerate(segments):
+        alike.setdefault(segment.kind, []).append(i)
+    return alike.values()
 
 
 def _ties(segment):
