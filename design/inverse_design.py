@@ -12,9 +12,9 @@ from pneunet.base.files.folder import output_folder
 from pneunet.base.files.schemas import STRAINS
 from pneunet.base.strains import RodStrains
 from pneunet.design.design import Design, chosen_law
+from pneunet.design.search.aims import OBJECTIVES, PAIRED
 from pneunet.design.search.doubts import WARN, WAYS, tell_doubts
 from pneunet.design.search.inverse import search
-from pneunet.design.search.aims import OBJECTIVES, PAIRED
 from pneunet.design.target.extraction import Extracted, extract, rates
 from pneunet.design.target.segmentation import NOTE, split
 from pneunet.design.target.target import Target

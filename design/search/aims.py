@@ -50,7 +50,7 @@ class Aim:
         if not self.nearest:
             return rod.at(self.fractions)
         fine = np.linspace(0, 1, FINE)
-        return rod.at(_nearest(rod.at(fine, sliding=False).points, fine, self.points), sliding=False)
+        return rod.at(_nearest(rod.points(fine), fine, self.points), sliding=False)
 
     def misfit(self, placed: Placed) -> np.ndarray:
         """(r,) in mm, whose squared norm is the mean squared distance."""

@@ -16,14 +16,13 @@ from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, PAIRS, Aim
-from pneunet.design.search.least_squares import Optimum
 from pneunet.design.search.lookup import Guess, first_guesses
 from pneunet.design.search.problem import Body, Evaluation, Problem
 from pneunet.design.search.space import Variable, grid, limits, prototype, variables_of
 from pneunet.design.search.whole import on_grid, optimised, with_whole_chambers
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import PRESSURE_LIMIT, Target
-from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.laws import SegmentLaw
 
@@ -39,7 +38,8 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True)
 class Found:
     """base_pose (4, 4) in target coordinates; pressure in MPa; cost in mm^2; active: bounds the optimum sits
-    on; flush_costs: mm by which steps in the underside would lower the misfit; at: the optimum's Evaluation."""
+    on; flush_costs: mm by which steps in the underside would lower the misfit; at: the design's Evaluation
+    in its problem."""
 
     manipulator: Manipulator
     pressure: float
@@ -71,8 +71,7 @@ def search(target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objecti
 def _guesses(target, pieces, prototypes, law):
     angles, heights = [], []
     for i, (piece, segment) in enumerate(zip(pieces, prototypes)):
-        least = 2 * segment.end_length + segment.chamber_thickness
-        if piece.length < least:
+        if segment.kind != PASSIVE and piece.length < (least := shortest(segment)):
             found = f"length_mm = {piece.length:.3g}"
             raise InputError(
                 f"[[piece]] {i + 1}: {found} is too short for one chamber and its ends ({least:.3g} mm)"
@@ -87,8 +86,13 @@ def _guesses(target, pieces, prototypes, law):
     return first_guesses(pieces, prototypes, angles, heights, pressures, law)
 
 
+def shortest(segment: Segment) -> float:
+    """Length (mm) of one chamber and its ends, at rest."""
+    return 2 * segment.end_length + segment.chamber_thickness
+
+
 def _angles(segments):
-    return " / ".join(f"{s.angle:.0f}" for s in segments)
+    return " / ".join("plain" if s.kind == PASSIVE else f"{s.angle:.0f}" for s in segments)
 
 
 class _Search:
@@ -156,7 +160,8 @@ class _Search:
     def _grid(self):
         casting = self.target.casting
         names = ("wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall")
-        steps = dict.fromkeys((*names, "cavity_thickness", "gap", "end_margin"), casting.grid or 0.001)
+        names += ("cavity_thickness", "gap", "end_margin", "plain_length")
+        steps = dict.fromkeys(names, casting.grid or 0.001)
         return {"angle": casting.angle_grid or 0.01} | steps
 
     def _found(self, problem, optimum, final, at, flush):
@@ -190,6 +195,8 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
         low, high = target.pressure_range
         variables.append(Variable("pressure", everyone, low, high, high - low))
     for i, count in enumerate(guess.counts):
+        if segments[i].kind == PASSIVE:
+            continue
         low, high = np.floor(max(1.0, (1 - SPLIT_KEPT) * count)), np.ceil((1 + SPLIT_KEPT) * count + 1)
         variables.append(Variable("chambers", (i,), low, high, 0.3 * count + 1, count))
     turns = np.eye(3)[:, : 3 if target.base_direction is None else 1 if target.base_width is None else 0]
@@ -247,6 +254,8 @@ def _active(problem, optimum):
 def about_to_touch(segments: Sequence[Segment], pressure: float) -> Iterator[str]:
     """Segments whose estimated clearance the design has used up, in words."""
     for i, segment in enumerate(segments, start=1):
+        if segment.kind == PASSIVE:
+            continue
         left = gap_left(segment, pressure)
         if left < 0.02 * segment.gap:
             yield (

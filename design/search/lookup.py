@@ -12,7 +12,7 @@ import numpy as np
 
 from pneunet.base.strains import RodStrains
 from pneunet.design.target.extraction import Extracted
-from pneunet.geometry.parameters import TWISTING, Segment
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
 from pneunet.reduced.rod.laws import SegmentLaw
 
 HEIGHT_WEIGHT = 0.1  # rad per mm away from the start height: decides only between equals
@@ -57,6 +57,9 @@ def first_guesses(
     tables: dict[tuple, tuple[list[Segment], np.ndarray]] = {}
     best = []
     for piece, prototype, a, h in zip(pieces, prototypes, angles, heights):
+        if prototype.kind == PASSIVE:
+            best.append([(0.0, prototype, 0.0)] * len(pressures))
+            continue
         key = prototype, tuple(a), tuple(h)
         if key not in tables:
             segments = [replace(prototype, angle=float(x), chamber_height=float(y)) for x in a for y in h]

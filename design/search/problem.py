@@ -13,17 +13,23 @@ from pneunet.base.left_jacobian import LeftJacobian
 from pneunet.design.search.aims import Aim
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
-from pneunet.geometry.parameters import Segment
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
 from pneunet.reduced.analytic.clearance import gap_left_and_slopes
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.piece_slopes import FIELDS, OF_LAWS, piece_twists
+from pneunet.reduced.rod.piece_slopes import (
+    FIELD_AT,
+    FIELDS,
+    OF_LAWS,
+    cell_strains_and_slopes,
+    cells_length_by,
+    piece_twists,
+)
 from pneunet.reduced.rod.placing import Placed, PlacedRod
 
 #: mm of misfit per mm that facing walls would overlap: contact is not designed into
 TOUCH = 5.0
 #: mm of misfit per large change that a dimension leaves its start by: decides where the target does not
 PREFERENCE = 0.02
-_AT = {name: i for i, name in enumerate(FIELDS)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +145,7 @@ class Problem:
 
     def _shape(self, body, number, aim):
         n = len(body.segments)
-        free, slopes = self.law.each_with_slopes(body.segments, body.pressures[number])
+        free, slopes = cell_strains_and_slopes(self.law, body.segments, body.pressures[number])
         twists, by = piece_twists(body.segments, free, slopes, body.counts)
         placed = aim.stations(PlacedRod(twists, body.base_pose))
         by, s = by.reshape(n, 18, -1), len(placed.poses)
@@ -154,7 +160,7 @@ class Problem:
         out = np.zeros((*by_fields.shape[:-2], len(self.x)))
         for j, v in enumerate(self.variables):
             if v.name != "pressure" or aim in v.aims:
-                out[..., j] = by_fields[..., list(v.segments), _AT[v.name]].sum(axis=-1)
+                out[..., j] = by_fields[..., list(v.segments), FIELD_AT[v.name]].sum(axis=-1)
         return out
 
     def _misfits(self, number, shape, body, omega):
@@ -170,16 +176,15 @@ class Problem:
         """Misfit at the body's edge, mm, of twists that no point of the target shows."""
         rows, slopes = [], []
         for i, (piece, segment) in enumerate(zip(self.pieces, body.segments)):
-            if not piece.twist_seen:
-                half, k1, length = segment.width / 2, shape.free[i, 3], body.counts[i] * segment.pitch
-                by = np.zeros((len(body.segments), len(FIELDS)))
-                by[i, OF_LAWS] = length * shape.slopes[i, 3]
-                by[i, _AT["chambers"]] = k1 * segment.pitch
-                for name, times in (("cavity_thickness", 1), ("wall", 2), ("gap", 1)):
-                    by[i, _AT[name]] += times * k1 * body.counts[i] / segment.sin
-                by[i, _AT["angle"]] -= k1 * length * segment.cot * np.radians(1.0)
-                rows.append(half * (k1 * length - piece.twist * piece.length))
-                slopes.append(half * self.columns(by, 0))
+            if piece.kind == TWISTING and not piece.twist_seen:
+                k1, count, by = shape.free[i, 3], body.counts[i], np.zeros((len(body.segments), len(FIELDS)))
+                half, length = segment.width / 2, count * segment.pitch
+                turn = k1 * length - piece.twist * piece.length
+                by[i] = half * k1 * cells_length_by(segment, count)
+                by[i, OF_LAWS] += half * length * shape.slopes[i, 3]
+                by[i, FIELD_AT["width"]] += turn / 2
+                rows.append(half * turn)
+                slopes.append(self.columns(by, 0))
         return np.array(rows), np.array(slopes).reshape(len(rows), len(self.x))
 
     def _touching(self, body):
@@ -187,6 +192,8 @@ class Problem:
         rows, slopes = [], []
         for number, pressures in enumerate(body.pressures):
             for i, (segment, pressure) in enumerate(zip(body.segments, pressures)):
+                if segment.kind == PASSIVE:
+                    continue
                 left, by_left = gap_left_and_slopes(segment, pressure)
                 if left < 0:
                     by = np.zeros((len(body.segments), len(FIELDS)))

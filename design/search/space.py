@@ -9,7 +9,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import BENDING, Target
-from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
+from pneunet.geometry.parameters import ONE_SIDED, PASSIVE, TWISTING, Segment
 
 Range = tuple[float, float]
 AT_BOUND = 1e-6  # of a variable's range
@@ -34,6 +34,7 @@ RANGES: dict[str, dict[str, tuple[Range, float]]] = {
         "gap": ((1, 3), 1.0),
         "end_margin": ((2, 4), 1.0),
     },
+    PASSIVE: {"plain_length": ((3, 500), 5.0), "base_thickness": ((1, 5), 1.5)},
 }
 UNITS = {"pressure": (" kPa", KPA_PER_MPA), "angle": (" deg", 1.0), "chambers": ("", 1.0)}
 
@@ -76,9 +77,14 @@ class Variable:
 def prototype(target: Target, piece: Extracted) -> Segment:
     """The Segment with a piece's start dimensions: material and shared dimensions are the same for all
     pieces."""
-    kind = TWISTING if piece.kind == TWISTING else ONE_SIDED
+    kind = piece.kind if piece.kind in (TWISTING, PASSIVE) else ONE_SIDED
+    of_chambers = TWISTING if kind == TWISTING else ONE_SIDED
     try:
-        return Segment(kind, 90.0, 1, **(START[kind] | target.start), material=target.material)
+        segment = Segment(
+            of_chambers, 90.0, 1, **(START[of_chambers] | target.start), material=target.material
+        )
+        segment = replace(segment, roll=round(piece.roll))
+        return segment.plain(piece.length) if kind == PASSIVE else segment
     except InputError as error:
         raise InputError(f"[segment] (start dimensions of the {kind} segments): {error}") from None
 
@@ -86,14 +92,14 @@ def prototype(target: Target, piece: Extracted) -> Segment:
 def limits(target: Target, piece: Extracted, segment: Segment) -> dict[str, tuple[Range, float]]:
     """{name: (range, large change)} of what varies in one segment."""
     ranges = RANGES[segment.kind]
-    if target.vary is not None:
-        ranges = {"angle": ranges["angle"], "end_margin": ranges["end_margin"]}
+    if target.vary is not None and segment.kind != PASSIVE:
+        ranges = {name: ranges[name] for name in ("angle", "end_margin")}
         ranges |= {name: ((low, high), max(high - low, 1e-6)) for name, (low, high) in target.vary.items()}
         if segment.kind == TWISTING:
             ranges.pop("base_thickness", None)
         _check_vary(target.vary, segment)
-    fixed = target.start.keys() - (target.vary or {}).keys() & {"end_margin"}
-    dropped = fixed & {"end_margin"} | ({"angle"} if piece.kind == BENDING else set())
+    given = "end_margin" in target.start and "end_margin" not in (target.vary or {})
+    dropped = ("angle",) * (piece.kind == BENDING) + ("end_margin",) * given
     return {name: both for name, both in ranges.items() if name not in dropped}
 
 
@@ -109,7 +115,7 @@ def _check_vary(vary, segment):
 def variables_of(
     target: Target, pieces: Sequence[Extracted], segments: Sequence[Segment], flush: bool
 ) -> list[Variable]:
-    """Of the dimensions of all segments. flush: the undersides of one-sided segments in one plane."""
+    """Of the dimensions of all segments. flush: the undersides of all but twisting ones in one plane."""
     found, base = [], []
     for i, (piece, segment) in enumerate(zip(pieces, segments)):
         usual = prototype(target, piece)
@@ -119,9 +125,9 @@ def variables_of(
                 continue
             if name == "base_thickness" and flush:
                 base.append((i, low, high, scale, start))
-            else:
+            elif name != "base_thickness" or segment.kind != PASSIVE:
                 found.append(Variable(name, (i,), float(low), float(high), scale, start))
-    if base:
+    if any(segments[i].kind == ONE_SIDED for i, *_ in base):
         members, lows, highs, scales, starts = zip(*base)
         found.append(Variable("base_thickness", members, max(lows), min(highs), scales[0], starts[0]))
     return found

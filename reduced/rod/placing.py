@@ -81,13 +81,23 @@ class PlacedRod:
         piece = np.minimum(np.searchsorted(self.ends, s, side="right"), len(self.ends) - 1)
         return piece, (s - self.ends[piece]) / self.lengths[piece] + 1
 
-    def at(self, fractions: np.ndarray, sliding: bool = True) -> Placed:
-        """The stations at fractions (s,) of the deformed length; sliding: these fractions are kept as pieces
-        change, otherwise the shares of the pieces that they lie at."""
+    def _elements_at(self, fractions):
+        """(pieces (s,), shares of them (s,), elements (s,), shares of them (s,)) of stations."""
         piece, share = self.locate(fractions)
         within = share * self._cuts[piece]
         number = np.clip(within.astype(int), 0, self._cuts[piece] - 1)
-        t, element = within - number, self._first[piece] + number
+        return piece, share, self._first[piece] + number, within - number
+
+    def points(self, fractions: np.ndarray) -> np.ndarray:
+        """(s, 3) stations at fractions (s,) of the deformed length, mm."""
+        _, _, element, t = self._elements_at(fractions)
+        steps = se3.exp_pose(t[:, None] * self._elements[element])
+        return (self._joints[0][element] @ steps)[:, :3, 3]
+
+    def at(self, fractions: np.ndarray, sliding: bool = True) -> Placed:
+        """The stations at fractions (s,) of the deformed length; sliding: these fractions are kept as pieces
+        change, otherwise the shares of the pieces that they lie at."""
+        piece, share, element, t = self._elements_at(fractions)
         joints, by_joints = self._joints
         J = LeftJacobian(t[:, None] * self._elements[element])
         poses, by = joints[element] @ J.pose, by_joints[element]

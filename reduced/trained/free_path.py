@@ -25,7 +25,7 @@ from pneunet.reduced.trained.side_by_side import SideBySide
 #: (Slopes next to a limit load count as FLAT there: at most 4e-6.)
 NEAR, LONGEST, MOST = 0.07, 0.7, 20
 #: the same where slopes are asked for, so that they are those of the strains to 1e-7
-NEAR_OF_SLOPES = 0.002
+NEAR_OF_SLOPES = 2e-4
 #: of d log P/d log(leading strain), from there on next to a limit load: derivatives and deviations are no
 #: larger than there
 FLAT = 0.02

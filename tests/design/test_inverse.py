@@ -5,9 +5,9 @@ import pytest
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.design.search.aims import EQ27
 from pneunet.design.search.inverse import search
 from pneunet.design.search.lookup import count_for
-from pneunet.design.search.aims import EQ27
 from pneunet.design.target.extraction import extract
 from pneunet.design.target.metrics import compare
 from pneunet.design.target.target import Piece, Target
