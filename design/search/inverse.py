@@ -32,28 +32,68 @@ SPLIT_KEPT = 0.3  # a segment's number of chambers stays within this fraction of
 #: the second
 FINE_ENOUGH, GOOD_ENOUGH = 1e-4, 1e-3
 STARTS = 4
+#: alternatives: so many, at pressures (MPa) so far apart, with angles (deg) so different or other numbers
+ALTERNATIVES, APART, DISTINCT = 3, 0.008, 3.0
+#: RMS of an alternative over the design's at which it takes its place
+BETTER = 0.9
+#: name -> step beyond a bound that its cost is told of, in words; 0.1 mm of all others
+USUAL = {"angle": (1.0, "1 deg"), "pressure": (0.001, "1 kPa"), "chambers": (1.0, "1")}
+#: mm; bounds that cost less are named without
+WORTH_TELLING = 0.005
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Found:
-    """base_pose (4, 4) in target coordinates; pressure in MPa; cost in mm^2; active: bounds the optimum sits
-    on; flush_costs: mm by which steps in the underside would lower the misfit; at: the design's Evaluation
-    in its problem."""
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A body that can be cast: pressures (aims,) in MPa; base_pose (4, 4) in target coordinates; rms: root
+    mean square misfit, mm; problem, at: what it is the optimum of, and its Evaluation."""
 
     manipulator: Manipulator
-    pressure: float
+    pressures: np.ndarray
     base_pose: np.ndarray
-    cost: float
-    active: tuple[str, ...]
-    flush_costs: float
-    evaluations: int
+    rms: float
     problem: Problem
     at: Evaluation
 
+    @property
+    def pressure(self) -> float:
+        """Of the first shape, MPa."""
+        return float(self.pressures[0])
 
-def search(target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objective: str = PAIRED) -> Found:
-    """The `Found` for a Target split into `pieces` (`Extracted`).
+    def __str__(self) -> str:
+        segments = self.manipulator.segments
+        counts = " / ".join(str(s.chambers) for s in segments)
+        pressures = ", ".join(f"{KPA_PER_MPA * P:.1f}" for P in self.pressures)
+        return f"angles {_angles(segments)} deg, chambers {counts}, {pressures} kPa, RMS {self.rms:.2f} mm"
+
+    def differs(self, other: "Candidate") -> bool:
+        """Whether another one has other numbers of chambers or clearly other angles."""
+        pairs = list(zip(self.manipulator.segments, other.manipulator.segments))
+        return any(a.chambers != b.chambers or abs(a.angle - b.angle) >= DISTINCT for a, b in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """best: the design. alternatives: distinct ones, best first. active: bounds that the optimum sits on, and
+    what they cost; stopped_by: the one that costs most, "" where none costs anything. flush_costs: mm by
+    which steps in the underside would lower the misfit."""
+
+    best: Candidate
+    alternatives: tuple[Candidate, ...]
+    active: tuple[str, ...]
+    stopped_by: str
+    flush_costs: float
+    evaluations: int
+
+
+def search(
+    target: Target,
+    pieces: Sequence[Extracted],
+    law: SegmentLaw,
+    objective: str = PAIRED,
+    alternatives: int = ALTERNATIVES,
+) -> Found:
+    """The `Found` for a Target split into `pieces` (`Extracted`), with so many alternatives at most.
 
     InputError where the pieces cannot be built, ConvergenceError where the law has no answer at any pressure.
     """
@@ -65,7 +105,7 @@ def search(target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objecti
         raise ConvergenceError(
             "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
         )
-    return _Search(target, tuple(pieces), law, objective).run(guesses)
+    return _Search(target, tuple(pieces), law, objective, alternatives).run(guesses)
 
 
 def _guesses(target, pieces, prototypes, law):
@@ -98,8 +138,9 @@ def _angles(segments):
 class _Search:
     """The way from guesses to a Found; counts evaluations."""
 
-    def __init__(self, target, pieces, law, objective):
+    def __init__(self, target, pieces, law, objective, most):
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
+        self.most = most if objective == PAIRED else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
 
     def run(self, guesses):
@@ -109,13 +150,19 @@ class _Search:
             problem, optimum = self._counted(optimised(replace(problem, aims=aims), self.floor))
         log.info(f"real-valued optimum: {_told(problem, optimum)}")
         flush = self._flush_costs(problem, optimum)
-        whole = with_whole_chambers(problem, optimum, self.floor)
-        self.evaluations += sum(o.evaluations for _, o in whole)
-        problem, optimum = whole[0]
-        log.info(f"whole chambers:      {_told(problem, optimum)}")
-        final, at = self._counted(on_grid(whole[0], self._grid(), self.floor))
-        log.info(f"dimensions on grid:  {_told(final, at)}")
-        return self._found(problem, optimum, final, at, flush)
+        whole = self._whole(problem, optimum)
+        log.info(f"whole chambers:      {_told(*whole)}")
+        best = self._cast(whole)
+        log.info(f"dimensions on grid:  {best}")
+        bounds = sorted(_active(*whole), key=lambda pair: -pair[0])
+        stopped = bounds[0][1] if bounds and bounds[0][0] > 0 else ""
+        alternatives = self._alternatives(best, whole, guesses)
+        if alternatives and alternatives[0].rms < BETTER * best.rms:
+            best, alternatives = alternatives[0], (best, *alternatives[1:])
+        touching = about_to_touch(best.manipulator.segments, float(best.pressures.max()))
+        return Found(
+            best, alternatives, (*(text for _, text in bounds), *touching), stopped, flush, self.evaluations
+        )
 
     def _counted(self, found):
         if found is None:
@@ -164,24 +211,66 @@ class _Search:
         steps = dict.fromkeys(names, casting.grid or 0.001)
         return {"angle": casting.angle_grid or 0.01} | steps
 
-    def _found(self, problem, optimum, final, at, flush):
-        body = final.body
-        counts = [round(n) for n in body.counts]
-        segments = [replace(s, chambers=n) for s, n in zip(body.segments, counts)]
-        pressure = round(float(body.pressures[0, 0]), 6)
-        active = (*_active(problem, optimum), *about_to_touch(segments, pressure))
-        cost, evaluations = float(at.at.residual @ at.at.residual), self.evaluations
-        return Found(
-            Manipulator(tuple(segments)),
-            pressure,
-            body.base_pose,
-            cost,
-            active,
-            flush,
-            evaluations,
-            final,
-            at.at,
-        )
+    def _whole(self, problem, optimum):
+        """With whole numbers of chambers."""
+        found = with_whole_chambers(problem, optimum, self.floor)
+        self.evaluations += sum(o.evaluations for _, o in found)
+        if not found:
+            raise ConvergenceError("no whole numbers of chambers near the optimum can be built")
+        return found[0]
+
+    def _cast(self, whole):
+        """The Candidate on the grid."""
+        problem, optimum = on_grid(whole, self._grid(), self.floor)
+        self.evaluations += optimum.evaluations
+        body = problem.body
+        pressures = body.pressures[:, 0].round(6)
+        body = replace(body, pressures=np.broadcast_to(pressures[:, None], body.pressures.shape))
+        problem = replace(problem, body=body, everything=True)
+        at = problem.evaluate(problem.x) or optimum.at
+        segments = tuple(replace(s, chambers=round(n)) for s, n in zip(body.segments, body.counts))
+        rms = float(np.sqrt(at.misfit))
+        return Candidate(Manipulator(segments), pressures, body.base_pose, rms, problem, at)
+
+    def _alternatives(self, best, whole, guesses):
+        """Distinct Candidates that are not much worse: from guesses at other pressures, then with one chamber
+        more or less."""
+        found = []
+        for problem in self._others(best, whole, guesses):
+            if len(found) == self.most:
+                break
+            other = optimised(problem, self.floor)
+            if other is None:
+                continue
+            self.evaluations += other[1].evaluations
+            candidate = self._cast(self._whole(*other))
+            allowed = max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+            if candidate.rms <= allowed and all(candidate.differs(c) for c in (best, *found)):
+                found.append(candidate)
+        return tuple(sorted(found, key=lambda c: c.rms))
+
+    def _others(self, best, whole, guesses):
+        seen = [best.pressure]
+        for guess in guesses:
+            if min(abs(guess.pressure - P) for P in seen) >= APART:
+                seen.append(guess.pressure)
+                yield _held_near(start(self.target, self.pieces, self.law, guess), guess.pressure)
+        problem = whole[0]
+        longest = int(np.argmax(problem.body.counts))
+        for change in (1, -1):
+            counts = problem.body.counts.copy()
+            counts[longest] = max(1, counts[longest] + change)
+            yield replace(problem, body=replace(problem.body, counts=counts))
+
+
+def _held_near(problem, pressure):
+    """The Problem with its pressure kept near one (MPa)."""
+    low, high = pressure - APART / 2, pressure + APART / 2
+    variables = (
+        replace(v, low=max(v.low, low), high=min(v.high, high)) if v.name == "pressure" else v
+        for v in problem.variables
+    )
+    return replace(problem, variables=tuple(variables))
 
 
 def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess: Guess) -> Problem:
@@ -245,10 +334,18 @@ def _told(problem, optimum):
 
 
 def _active(problem, optimum):
-    """Bounds that the optimum sits on, in words."""
-    for variable, value in zip(problem.variables, optimum.x):
-        if variable.bound(value) is not None:
-            yield variable.text(value)
+    """Yields (mm that the root mean square would fall by if it were a usual step wider, that in words) of
+    each bound that the optimum sits on."""
+    at = optimum.at
+    gradient = 2 * at.residual @ at.jacobian
+    for variable, value, slope in zip(problem.variables, optimum.x, gradient):
+        if variable.bound(value) is None:
+            continue
+        step, told = USUAL.get(variable.name, (0.1, "0.1 mm"))
+        outwards = slope if variable.bound(value) == variable.low else -slope
+        saved = np.sqrt(at.misfit) - np.sqrt(max(at.misfit - max(outwards, 0.0) * step, 0.0))
+        worth = f"; {told} beyond would save {saved:.2g} mm" if saved >= WORTH_TELLING else ""
+        yield float(saved) * (saved >= WORTH_TELLING), variable.text(value) + worth
 
 
 def about_to_touch(segments: Sequence[Segment], pressure: float) -> Iterator[str]:

@@ -14,6 +14,7 @@ from pneunet.design.search.aims import Aim
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
 from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
+from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.analytic.clearance import gap_left_and_slopes
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.piece_slopes import (
@@ -100,7 +101,7 @@ class Evaluation:
 @dataclass(frozen=True, eq=False)
 class Problem:
     """The problem around a Body: variables, then turns of the base about axes (the columns of `turns` (3, t),
-    in base axes) are what is sought."""
+    in base axes) are what is sought. everything: derivatives by fields that do not vary are wanted too."""
 
     aims: tuple[Aim, ...]
     pieces: tuple[Extracted, ...]
@@ -108,6 +109,7 @@ class Problem:
     variables: tuple[Variable, ...]
     body: Body
     turns: np.ndarray
+    everything: bool = False
 
     @cached_property
     def x(self) -> np.ndarray:
@@ -144,8 +146,9 @@ class Problem:
         return Evaluation(body, shapes, residual, jacobian, misfit)
 
     def _shape(self, body, number, aim):
-        n = len(body.segments)
-        free, slopes = cell_strains_and_slopes(self.law, body.segments, body.pressures[number])
+        n, pressures = len(body.segments), body.pressures[number]
+        names = SHAPE if self.everything else {v.name for v in self.variables}
+        free, slopes = cell_strains_and_slopes(self.law, body.segments, pressures, names)
         twists, by = piece_twists(body.segments, free, slopes, body.counts)
         placed = aim.stations(PlacedRod(twists, body.base_pose))
         by, s = by.reshape(n, 18, -1), len(placed.poses)

@@ -41,8 +41,8 @@ class Extracted:
     """What one segment is to do, per deformed length: length mm, twist (tau or torsion) rad/mm, curvature
     1/mm.
 
-    roll in degrees as a Piece's. twist_seen: the points (or frames) determine the twist. fit_rms: mm between the points and the piece of
-    uniform rates. note: what had to be assumed.
+    roll in degrees, as a Piece's. twist_seen: the points (or frames) determine the twist. fit_rms: mm between
+    the points and the piece of uniform rates. note: what had to be assumed.
     """
 
     kind: str

@@ -41,7 +41,8 @@ class Target:
     frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); pieces: the
     split; base_direction, base_width (3,): unit vectors that fix the base (width None = its roll stays free);
     pressure_range (low, high) in MPa, equal = fixed; material; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice; casting: how it is cast; source: name of the file that it was read from.
+    Segment: (low, high)} or None for the default choice; casting: how it is cast; source: name of the
+    file that it was read from.
     """
 
     points: np.ndarray

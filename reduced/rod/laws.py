@@ -6,7 +6,7 @@ state, its gradient is (force, moment) in the section frame.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
@@ -127,15 +127,17 @@ class SegmentLaw(ABC):
         return RodStrains.of_vector(q)
 
     def each_with_slopes(
-        self, segments: Sequence[Segment], pressure: float | ArrayLike
+        self, segments: Sequence[Segment], pressure: float | ArrayLike, names: Collection[str] = SHAPE
     ) -> tuple[np.ndarray, np.ndarray]:
         """(strains (n, 6) as `each` gives them, their derivatives (n, 6, 14) by the lengths of SHAPE, in
-        degrees and mm, and by the pressure in MPa); here by central differences."""
+        degrees and mm, and by the pressure in MPa); here by central differences, and only by those of SHAPE
+        that are among `names`, the others 0."""
         pressures = np.broadcast_to(np.asarray(pressure, float), len(segments))
         slopes = np.zeros((len(segments), 6, len(SHAPE) + 1))
         for i, (segment, P) in enumerate(zip(segments, pressures)):
             for j, name in enumerate(SHAPE):
-                slopes[i, :, j] = self._slope(segment, P, name)
+                if name in names:
+                    slopes[i, :, j] = self._slope(segment, P, name)
             step = DIFFERENCE * max(P, DIFFERENCE)
             low, high = (self.strains(segment, P + d).vector for d in (-step, step))
             slopes[i, :, -1] = (high - low) / (2 * step)
@@ -156,6 +158,11 @@ class SegmentLaw(ABC):
     def excess(self, segment: Segment, pressure: float) -> np.ndarray:
         """How far (0: not at all) the segment lies outside what the law knows, (d,) in widths of that."""
         return np.zeros(1)
+
+    def half_width(self, segment: Segment, pressure: float) -> np.ndarray | None:
+        """(6,) half of the 90 % interval of each free strain at a pressure in MPa, or None where the law does
+        not know how wrong it is."""
+        return None
 
     def doubts(self, segment: Segment, pressure: float | ArrayLike) -> tuple[str, ...]:
         """Reasons, as text, not to trust the law for a segment at a pressure or several; () when there are

@@ -1,7 +1,7 @@
-"""A body's free pieces, as reduced.rod.ends has them, with their derivatives by every dimension, the number of
-chambers and the pressure."""
+"""A body's free pieces, as reduced.rod.ends has them, with their derivatives by every dimension, the number
+of chambers and the pressure."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,16 +24,17 @@ _OF_PITCH = [FIELD_AT[name] for name in PITCH_BY]
 
 
 def cell_strains_and_slopes(
-    law: SegmentLaw, segments: Sequence[Segment], pressures: ArrayLike
+    law: SegmentLaw, segments: Sequence[Segment], pressures: ArrayLike, names: Collection[str] = SHAPE
 ) -> tuple[np.ndarray, np.ndarray]:
     """(free strains (n, 6) of the cells in their own axes, derivatives (n, 6, 14) by OF_LAWS) at a pressure
-    (MPa) for all or (n,); passive segments are at rest."""
+    (MPa) for all or (n,), by those of SHAPE that are among `names` at least; passive segments are at
+    rest."""
     n = len(segments)
     free, slopes = np.tile(np.eye(6)[0], (n, 1)), np.zeros((n, 6, len(OF_LAWS)))
     rows = [i for i, s in enumerate(segments) if s.kind != PASSIVE]
     if rows:
         pressures = np.broadcast_to(np.asarray(pressures, float), n)[rows]
-        free[rows], slopes[rows] = law.each_with_slopes([segments[i] for i in rows], pressures)
+        free[rows], slopes[rows] = law.each_with_slopes([segments[i] for i in rows], pressures, names)
     return free, slopes
 
 

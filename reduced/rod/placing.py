@@ -53,7 +53,7 @@ class PlacedRod:
 
     @cached_property
     def _joints(self):
-        """Poses (n + 1, 4, 4) of the elements' ends and their derivatives (n + 1, 6, m, 6), spatial twists."""
+        """Poses (n + 1, 4, 4) of the elements' ends, their derivatives (n + 1, 6, m, 6), spatial twists."""
         J = LeftJacobian(self._elements)
         steps, m = J.pose, len(self.twists)
         poses = np.empty((len(steps) + 1, 4, 4))

@@ -6,7 +6,7 @@ train` (reduced.training.train), stored by reduced.trained.file.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -162,9 +162,9 @@ class TrainedLaw(SegmentLaw):
         return RodStrains(found.e[:, 0], found.k[:, 0])
 
     def each_with_slopes(
-        self, segments: Sequence[Segment], pressure: float | ArrayLike
+        self, segments: Sequence[Segment], pressure: float | ArrayLike, names: Collection[str] = SHAPE
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As SegmentLaw.each_with_slopes, exact."""
+        """As SegmentLaw.each_with_slopes, exact and by all of SHAPE."""
         shape, pitch = shapes_of(segments)
         mu = np.array([s.material.mu for s in segments])
         P = np.broadcast_to(checked_pressure(pressure), len(segments)) / mu
@@ -198,6 +198,10 @@ class TrainedLaw(SegmentLaw):
         return self._kind(segment).excess(
             shape_numbers(segment)[None], np.array([pressure / segment.material.mu])
         )[0]
+
+    def half_width(self, segment: Segment, pressure: float) -> np.ndarray:
+        """As SegmentLaw.half_width."""
+        return self.of(segment).half_width(pressure)
 
     def doubts(self, segment: Segment, pressure: float | ArrayLike) -> tuple[str, ...]:
         """Reasons, as text, not to trust the law for a segment at a pressure (MPa) or several; () when there
