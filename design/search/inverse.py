@@ -140,6 +140,7 @@ class _Search:
 
     def __init__(self, target, pieces, law, objective, most):
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
+        self.optima = []
         self.most = most if objective == PAIRED else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
 
@@ -176,20 +177,23 @@ class _Search:
             f"lookup table: first guess at {KPA_PER_MPA * guesses[0].pressure:.1f} kPa, angles "
             + _angles(guesses[0].segments)
         )
-        best = None
         for guess in guesses[:STARTS]:
-            found = optimised(start(self.target, self.pieces, self.law, guess), self.floor)
-            if found is None:
-                continue
-            self.evaluations += found[1].evaluations
-            if best is None or found[1].cost < best[1].cost:
-                best = found
-            if best[1].cost < (GOOD_ENOUGH * self.target.length) ** 2:
+            self._try(start(self.target, self.pieces, self.law, guess))
+            best = min(self.optima, key=lambda found: found[1].cost, default=None)
+            if best and best[1].cost < (GOOD_ENOUGH * self.target.length) ** 2:
                 break
-        if best is None:
+        if not self.optima:
             least = KPA_PER_MPA * min(g.pressure for g in guesses)
             raise ConvergenceError(f"the law has no equilibrium at {least:.1f} kPa: lower the pressure")
         return best
+
+    def _try(self, problem):
+        """Its local optimum to the others'."""
+        found = optimised(problem, self.floor)
+        if found is not None:
+            self.evaluations += found[1].evaluations
+            self.optima.append(found)
+        return found
 
     def _flush_costs(self, problem, optimum):
         """By how much (mm) the root mean square would fall if undersides need not be flush."""
@@ -233,34 +237,39 @@ class _Search:
         return Candidate(Manipulator(segments), pressures, body.base_pose, rms, problem, at)
 
     def _alternatives(self, best, whole, guesses):
-        """Distinct Candidates that are not much worse: from guesses at other pressures, then with one chamber
-        more or less."""
-        found = []
-        for problem in self._others(best, whole, guesses):
-            if len(found) == self.most:
-                break
-            other = optimised(problem, self.floor)
-            if other is None:
+        """Distinct Candidates that are not much worse."""
+        found, allowed = [], max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+        for other in self._others(whole, guesses) if self.most else ():
+            if np.sqrt(other[1].at.misfit) > allowed:
                 continue
-            self.evaluations += other[1].evaluations
-            candidate = self._cast(self._whole(*other))
-            allowed = max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+            candidate = self._cast(other)
             if candidate.rms <= allowed and all(candidate.differs(c) for c in (best, *found)):
                 found.append(candidate)
+                if len(found) == self.most:
+                    break
         return tuple(sorted(found, key=lambda c: c.rms))
 
-    def _others(self, best, whole, guesses):
-        seen = [best.pressure]
-        for guess in guesses:
-            if min(abs(guess.pressure - P) for P in seen) >= APART:
-                seen.append(guess.pressure)
-                yield _held_near(start(self.target, self.pieces, self.law, guess), guess.pressure)
-        problem = whole[0]
-        longest = int(np.argmax(problem.body.counts))
+    def _others(self, whole, guesses):
+        """With whole chambers: from the other local optima, at other pressures, with one chamber more or
+        less."""
+        chosen = whole[0].body.pressures[0, 0]
+        seen = [chosen]
+        for problem, optimum in sorted(self.optima, key=lambda found: found[1].cost):
+            if min(abs(problem.body.pressures[0, 0] - P) for P in seen) >= APART:
+                seen.append(problem.body.pressures[0, 0])
+                yield self._whole(problem, optimum)
+        apart = [g for g in guesses[:ALTERNATIVES] if min(abs(g.pressure - P) for P in seen) >= APART]
+        for guess in apart:
+            first = start(self.target, self.pieces, self.law, guess)
+            if found := self._try(_held_near(first, guess.pressure)):
+                yield self._whole(*found)
+        body = whole[0].body
+        longest = int(np.argmax(body.counts))
         for change in (1, -1):
-            counts = problem.body.counts.copy()
+            counts = body.counts.copy()
             counts[longest] = max(1, counts[longest] + change)
-            yield replace(problem, body=replace(problem.body, counts=counts))
+            if found := self._try(replace(whole[0], body=replace(body, counts=counts))):
+                yield found
 
 
 def _held_near(problem, pressure):

@@ -14,7 +14,7 @@ from pneunet.design.search.space import Variable
 
 #: numbers of chambers that are tried beyond the most promising ones, and the cost over that of real-valued
 #: ones at which the search for others stops
-TRIED, GOOD_ENOUGH = 4, 1.2
+TRIED, GOOD_ENOUGH = 3, 1.2
 #: whole numbers of chambers that are looked at
 MOST_COMBINATIONS = 4096
 #: rounded first, while all others are still free to make up for it
