@@ -192,8 +192,8 @@ def answer(design: Design) -> Iterator[str]:
         rms, tip = np.hypot(spread.law_rms, spread.mesh_rms), np.hypot(spread.law_tip, spread.mesh_tip)
         yield (
             f"the real body may be {rms:.1f} mm RMS and {tip:.1f} mm at the tip from this prediction:"
-            f" {spread.law_tip:.1f} mm (90 % of cases) for the law, {spread.mesh_tip:.1f} mm for the mesh of its"
-            " cells, which is a little too stiff"
+            f" {spread.law_tip:.1f} mm (90 % of cases) for the law, {spread.mesh_tip:.1f} mm for the mesh of"
+            " its cells, which is a little too stiff"
         )
     if target.material is PAPER_TWISTING:
         material = f"{target.material.name}, mu = {target.material.mu:g} MPa"

@@ -21,14 +21,16 @@ from pneunet.reduced.rod.piece_slopes import (
     FIELD_AT,
     FIELDS,
     OF_LAWS,
-    cell_strains_and_slopes,
+    cell_states,
     cells_length_by,
     piece_twists,
 )
 from pneunet.reduced.rod.placing import Placed, PlacedRod
+from pneunet.reduced.rod.states import StatesWithSlopes
 
 #: mm of misfit per mm that facing walls would overlap: contact is not designed into
 TOUCH = 5.0
+BEYOND = 20.0  # mm of misfit per width of what the law knows that a segment lies outside of it
 #: mm of misfit per large change that a dimension leaves its start by: decides where the target does not
 PREFERENCE = 0.02
 
@@ -77,13 +79,12 @@ class Body:
 @dataclass(frozen=True, eq=False)
 class Shape:
     """One shape of a Body and how it changes: placed stations; turns, moves (s, 3, n, fields): their
-    derivatives by FIELDS of every segment; free (n, 6), slopes (n, 6, 14) as laws give them."""
+    derivatives by FIELDS of every segment; states: of the cells."""
 
     placed: Placed
     turns: np.ndarray
     moves: np.ndarray
-    free: np.ndarray
-    slopes: np.ndarray
+    states: StatesWithSlopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +142,7 @@ class Problem:
         parts = [self._misfits(i, shape, body, omega) for i, shape in enumerate(shapes)]
         misfit = sum(float(r @ r) for r, _ in parts) / len(parts)
         parts = [(r / np.sqrt(len(shapes)), J / np.sqrt(len(shapes))) for r, J in parts]
+        parts += [self._doubts(i, shape) for i, shape in enumerate(shapes)]
         parts += [self._unseen_twists(body, shapes[0]), self._touching(body), self._preferences(x)]
         residual, jacobian = np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
         return Evaluation(body, shapes, residual, jacobian, misfit)
@@ -148,15 +150,16 @@ class Problem:
     def _shape(self, body, number, aim):
         n, pressures = len(body.segments), body.pressures[number]
         names = SHAPE if self.everything else {v.name for v in self.variables}
-        free, slopes = cell_strains_and_slopes(self.law, body.segments, pressures, names)
-        twists, by = piece_twists(body.segments, free, slopes, body.counts)
+        states = cell_states(self.law, body.segments, pressures, names)
+        by_laws = states.strains_by[:, :, : len(OF_LAWS)]
+        twists, by = piece_twists(body.segments, states.strains, by_laws, body.counts)
         placed = aim.stations(PlacedRod(twists, body.base_pose))
         by, s = by.reshape(n, 18, -1), len(placed.poses)
         turns, moves = (
             np.moveaxis(a.reshape(3 * s, n, 18).swapaxes(0, 1) @ by, 0, 1).reshape(s, 3, n, -1)
             for a in (placed.turns, placed.moves)
         )
-        return Shape(placed, turns, moves, free, slopes)
+        return Shape(placed, turns, moves, states)
 
     def columns(self, by_fields: np.ndarray, aim: int) -> np.ndarray:
         """(..., n) derivatives by x, those of the base 0, from those (..., segments, fields) of one shape."""
@@ -175,16 +178,27 @@ class Problem:
             moves[:, :, count:] = -se3.hat(placed.points - body.origin) @ omega
         return aim.misfit(placed), aim.slopes(placed, turns, moves)
 
+    def _doubts(self, number, shape):
+        """BEYOND times how far each segment lies outside what the law knows."""
+        states = shape.states
+        segment, what = np.nonzero(states.excess)
+        by = np.zeros((len(segment), len(states.excess), len(FIELDS)))
+        by[np.arange(len(segment))[:, None], segment[:, None], OF_LAWS] = states.excess_by[
+            segment, what, : len(OF_LAWS)
+        ]
+        return BEYOND * states.excess[segment, what], BEYOND * self.columns(by, number)
+
     def _unseen_twists(self, body, shape):
         """Misfit at the body's edge, mm, of twists that no point of the target shows."""
         rows, slopes = [], []
         for i, (piece, segment) in enumerate(zip(self.pieces, body.segments)):
             if piece.kind == TWISTING and not piece.twist_seen:
-                k1, count, by = shape.free[i, 3], body.counts[i], np.zeros((len(body.segments), len(FIELDS)))
+                k1, count = shape.states.strains[i, 3], body.counts[i]
+                by = np.zeros((len(body.segments), len(FIELDS)))
                 half, length = segment.width / 2, count * segment.pitch
                 turn = k1 * length - piece.twist * piece.length
                 by[i] = half * k1 * cells_length_by(segment, count)
-                by[i, OF_LAWS] += half * length * shape.slopes[i, 3]
+                by[i, OF_LAWS] += half * length * shape.states.strains_by[i, 3, : len(OF_LAWS)]
                 by[i, FIELD_AT["width"]] += turn / 2
                 rows.append(half * turn)
                 slopes.append(self.columns(by, 0))

@@ -110,7 +110,9 @@ def _of_the_law(body, shape, law):
     None; (RMS, tip) of the mesh, whose error is the same everywhere."""
     squares, by_strains = np.zeros(2), strain_moves(body, shape)
     share = np.array([MESH.get(s.kind, 0.0) for s in body.segments])
-    of_mesh = _sizes(np.einsum("sxnj,nj->sx", by_strains, share[:, None] * (shape.free - np.eye(6)[0])))
+    of_mesh = _sizes(
+        np.einsum("sxnj,nj->sx", by_strains, share[:, None] * (shape.states.strains - np.eye(6)[0]))
+    )
     for i, segment in enumerate(body.segments):
         if segment.kind == PASSIVE:
             continue
@@ -128,7 +130,9 @@ def strain_moves(body: Body, shape: Shape) -> np.ndarray:
     unit, none = np.zeros((2, n, 6, len(OF_LAWS)))
     unit[:, range(6), range(6)] = 1.0
     # of strains alone: what lengths do on their own is in both
-    with_strains, without = (piece_twists(body.segments, shape.free, a, body.counts)[1] for a in (unit, none))
+    with_strains, without = (
+        piece_twists(body.segments, shape.states.strains, a, body.counts)[1] for a in (unit, none)
+    )
     by = (with_strains - without)[..., OF_LAWS[:6]].reshape(n, 18, 6)
     moves = shape.placed.moves
     return np.moveaxis(moves.reshape(-1, n, 18).swapaxes(0, 1) @ by, 0, 1).reshape(len(moves), 3, n, 6)

@@ -18,6 +18,7 @@ from pneunet.base.strains import RodStrains
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.parameters import Segment
 from pneunet.geometry.shape_numbers import SHAPE
+from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
 
 #: degrees and mm, and of the pressure: of laws without slopes of their own
 DIFFERENCE = 1e-4
@@ -128,20 +129,20 @@ class SegmentLaw(ABC):
 
     def each_with_slopes(
         self, segments: Sequence[Segment], pressure: float | ArrayLike, names: Collection[str] = SHAPE
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(strains (n, 6) as `each` gives them, their derivatives (n, 6, 14) by the lengths of SHAPE, in
-        degrees and mm, and by the pressure in MPa); here by central differences, and only by those of SHAPE
-        that are among `names`, the others 0."""
+    ) -> StatesWithSlopes:
+        """StatesWithSlopes of n segments at a pressure in MPa, one for all or (n,), of the strains alone; by
+        central differences, and only by those of SHAPE that are among `names`, the others 0."""
         pressures = np.broadcast_to(np.asarray(pressure, float), len(segments))
-        slopes = np.zeros((len(segments), 6, len(SHAPE) + 1))
-        for i, (segment, P) in enumerate(zip(segments, pressures)):
+        slopes = np.zeros((len(segments), 6, len(VARIABLES)))
+        for by, segment, P in zip(slopes, segments, pressures):
             for j, name in enumerate(SHAPE):
                 if name in names:
-                    slopes[i, :, j] = self._slope(segment, P, name)
+                    by[:, j] = self._slope(segment, P, name)
             step = DIFFERENCE * max(P, DIFFERENCE)
             low, high = (self.strains(segment, P + d).vector for d in (-step, step))
-            slopes[i, :, -1] = (high - low) / (2 * step)
-        return self.each(segments, pressures).vector, slopes
+            by[:, -2] = (high - low) / (2 * step)
+            by[:, -1] = -P / segment.material.mu * by[:, -2]
+        return StatesWithSlopes.of_strains(self.each(segments, pressures).vector, slopes)
 
     def _slope(self, segment, pressure, name):
         """(6,) derivative by one of SHAPE; 0 where the segment cannot be changed in it, one-sided where only

@@ -2,6 +2,7 @@
 of chambers and the pressure."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from pneunet.geometry.sections import rotation
 from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.states import StatesWithSlopes
 
 #: what the derivatives are by, in order: degrees, mm, mm, mm, -, MPa
 FIELDS = (*SHAPE, "end_margin", "plain_length", "chambers", "pressure")
@@ -23,19 +25,22 @@ PITCH_BY = {"cavity_thickness": 1.0, "wall": 2.0, "gap": 1.0}
 _OF_PITCH = [FIELD_AT[name] for name in PITCH_BY]
 
 
-def cell_strains_and_slopes(
+def cell_states(
     law: SegmentLaw, segments: Sequence[Segment], pressures: ArrayLike, names: Collection[str] = SHAPE
-) -> tuple[np.ndarray, np.ndarray]:
-    """(free strains (n, 6) of the cells in their own axes, derivatives (n, 6, 14) by OF_LAWS) at a pressure
-    (MPa) for all or (n,), by those of SHAPE that are among `names` at least; passive segments are at
-    rest."""
+) -> StatesWithSlopes:
+    """StatesWithSlopes of n segments in their own axes at a pressure (MPa) for all or (n,), by those of SHAPE
+    that are among `names` at least; passive segments are at rest and known."""
     n = len(segments)
-    free, slopes = np.tile(np.eye(6)[0], (n, 1)), np.zeros((n, 6, len(OF_LAWS)))
     rows = [i for i, s in enumerate(segments) if s.kind != PASSIVE]
-    if rows:
-        pressures = np.broadcast_to(np.asarray(pressures, float), n)[rows]
-        free[rows], slopes[rows] = law.each_with_slopes([segments[i] for i in rows], pressures, names)
-    return free, slopes
+    pressures = np.broadcast_to(np.asarray(pressures, float), n)[rows]
+    found = law.each_with_slopes([segments[i] for i in rows], pressures, names)
+    if len(rows) == n:
+        return found
+    whole = {f.name: np.zeros((n, *getattr(found, f.name).shape[1:])) for f in fields(found)}
+    whole["strains"][:, 0] = 1.0
+    for name, values in whole.items():
+        values[rows] = getattr(found, name)
+    return StatesWithSlopes(**whole)
 
 
 def piece_twists(
@@ -44,8 +49,8 @@ def piece_twists(
     """(twists (3 n, 6) = (k, e) times length of the pieces of n segments in the body's axes, derivatives
     (3 n, 6, fields) by FIELDS of their own segment).
 
-    free (n, 6), slopes (n, 6, 14): of the cells, as `cell_strains_and_slopes` gives them; counts (n,): real
-    numbers of chambers.
+    free (n, 6), slopes (n, 6, 14): strains of the cells, derivatives by OF_LAWS; counts (n,): real numbers of
+    chambers.
     """
     lengths, strains = free_pieces(segments, RodStrains.of_vector(free), counts)
     by = np.zeros((len(segments), 3, 6, len(FIELDS)))

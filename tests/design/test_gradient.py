@@ -14,7 +14,7 @@ from pneunet.design.target.target import Target
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced import predict, shipped_law
 from pneunet.reduced.rod.ends import cell_strains, free_pieces
-from pneunet.reduced.rod.piece_slopes import FIELDS, cell_strains_and_slopes, piece_twists
+from pneunet.reduced.rod.piece_slopes import FIELDS, cell_states, piece_twists
 
 SEGMENTS = (
     Segment("twisting", 65.0, 1, gap=2.2, cavity_floor=0.4, chamber_height=5.5),
@@ -85,9 +85,9 @@ def test_the_gradient_to_nearest_points_is_exact():
 
 def test_pieces_and_points_are_those_of_the_prediction():
     law, counts = shipped_law(), np.array([7, 5, 16, 0])
-    free, slopes = cell_strains_and_slopes(law, SEGMENTS, 0.03)
+    states = cell_states(law, SEGMENTS, 0.03)
     lengths, strains = free_pieces(SEGMENTS, cell_strains(law, SEGMENTS, 0.03), counts)
-    twists, _ = piece_twists(SEGMENTS, free, slopes, counts)
+    twists, _ = piece_twists(SEGMENTS, states.strains, states.strains_by[:, :, :14], counts)
     assert twists == pytest.approx(lengths[:, None] * strains.twist_vector, abs=1e-4)
     these = problem(law)
     body = replace(these.body, counts=counts.astype(float), pressures=np.full((2, 4), 0.03))

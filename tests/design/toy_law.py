@@ -5,6 +5,7 @@ import numpy as np
 from pneunet.base.errors import ConvergenceError
 from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.rod.laws import FreeSection, SegmentLaw
+from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
 
 #: what its strains depend on besides the pressure, and an imaginary step for derivatives
 OF_SHAPE, STEP = ("angle", "chamber_height", "base_thickness"), 1e-30j
@@ -21,14 +22,14 @@ class ToyLaw(SegmentLaw):
 
     def each_with_slopes(self, segments, pressure, names=SHAPE):
         pressures = np.broadcast_to(pressure, len(segments))
-        q, slopes = self.each(segments, pressures).vector, np.zeros((len(segments), 6, len(SHAPE) + 1))
-        places = [SHAPE.index(name) for name in OF_SHAPE] + [-1]
+        q, slopes = self.each(segments, pressures).vector, np.zeros((len(segments), 6, len(VARIABLES)))
+        places = [VARIABLES.index(name) for name in (*OF_SHAPE, "pressure")]
         for segment, P, rows in zip(segments, pressures, slopes):
             values = np.array([*(getattr(segment, name) for name in OF_SHAPE), P], complex)
             for j, place in enumerate(places):
                 stepped = values + STEP * np.eye(4)[j]
                 rows[:, place] = strains(segment.kind, *stepped).imag / STEP.imag
-        return q, slopes
+        return StatesWithSlopes.of_strains(q, slopes)
 
 
 def strains(kind, angle, chamber_height, base_thickness, P):
