@@ -28,38 +28,42 @@ class _Part:
     after: np.ndarray
 
 
-def _wanted(stretch, variance):
-    """(cost, (k1, k2) wanted): the cheapest of straight, circle and helix for a stretch."""
+def _options(stretch, variance, framed):
+    """[(cost, (k1, k2) wanted)] of a stretch as straight, circle and helix."""
     square, (torsion, bend) = stretch.square / variance, stretch.wald / variance
-    options = (
-        (square + min(bend + torsion, 2 * bend), (False, False)),
+    # without frames a straight stretch may have any torsion
+    straight = bend + torsion if framed else bend
+    return (
+        (square + straight, (False, False)),
         (square + torsion + PRICE, (False, True)),
         (square + 2 * PRICE, (True, True)),
     )
-    return min(options)
 
 
 def chain(stretches: Stretches, noise: float) -> list[tuple[Stretch, np.ndarray]]:
     """The stretches, each with (2,) whether k1 and k2 are wanted, that together cover the curve at the least
-    price: dynamic programming over the cells."""
+    price: dynamic programming over the cells. No two straight ones follow each other."""
     count = len(stretches.edges) - 1
-    best: list[tuple[float, tuple | None]] = [(0.0, None)] + [(np.inf, None)] * count
+    framed = stretches.frames is not None
+    #: of every cell's end, by whether what ends there is straight: cost, stretch and what comes before it
+    best: list[dict[bool, tuple]] = [{False: (0.0, None, None, None)}] + [{} for _ in range(count)]
     by_end: list[list[Stretch]] = [[] for _ in range(count + 1)]
     for stretch in stretches.found.values():
         by_end[stretch.last].append(stretch)
     for last in range(1, count + 1):
         for stretch in by_end[last]:
-            before = best[stretch.first][0]
-            if np.isfinite(before):
-                cost, wanted = _wanted(stretch, noise**2)
-                cost += before + 2 * PRICE + FREE_FRAME
-                if cost < best[last][0]:
-                    best[last] = (cost, (stretch, np.array(wanted)))
-    found, last = [], count
+            for cost, wanted in _options(stretch, noise**2, framed):
+                straight = not framed and not wanted[1]
+                for before, step in best[stretch.first].items():
+                    total = step[0] + cost + 2 * PRICE + FREE_FRAME
+                    if not (straight and before) and total < best[last].get(straight, (np.inf,))[0]:
+                        best[last][straight] = (total, stretch, np.array(wanted), before)
+    found: list[tuple[Stretch, np.ndarray]] = []
+    last, straight = count, min(best[count], key=lambda s: best[count][s][0])
     while last:
-        step = best[last][1]
-        found.insert(0, step)
-        last = step[0].first
+        _, stretch, wanted, straight = best[last][straight]
+        found.insert(0, (stretch, wanted))
+        last = stretch.first
     return found
 
 
