@@ -140,8 +140,8 @@ def _curve(table, folder, where):
     own."""
     if sum(key in table for key in CURVES) != 1:
         raise InputError(
-            f"{where}: give one of 'points' (a CSV file), 'points_mm' (a list of [x, y, z]), [wrap], 'tip_points'"
-            " or 'target'"
+            f"{where}: give one of 'points' (a CSV file), 'points_mm' (a list of [x, y, z]), [wrap],"
+            " 'tip_points' or 'target'"
         )
     if "points" in table:
         if not isinstance(table["points"], str):

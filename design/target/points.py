@@ -26,7 +26,7 @@ def checked_points(points: object) -> np.ndarray:
     if len(points) > MOST_POINTS:
         every = -(-len(points) // 10_000)
         raise InputError(
-            f"{len(points)} points are over {MOST_POINTS}: keep every {every}th, which is enough for any curve"
+            f"{len(points)} points are over {MOST_POINTS}: keep every {every}th, which is enough for a curve"
         )
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
@@ -51,21 +51,23 @@ def _check_strides(points):
     """InputError for a curve that is too long, closed or folded: seen in chords, since noise lengthens a
     curve and turns its steps."""
     at = strides(points, STRIDE)
-    if STRIDE * (len(at) - 1) > 2000:
-        raise InputError("the curve is over 2000 mm long, outside 10..2000 mm: are its coordinates in mm?")
-    gap = np.linalg.norm(points[-1] - points[0])
-    if gap < STRIDE / 2 and len(at) > 3:
-        raise InputError(
-            f"the curve is closed: its last point lies {gap:.3g} mm from its first, and base and tip of a body"
-            f" are at least {STRIDE / 2:g} mm apart: leave out its end"
-        )
     chords = np.diff(points[at], axis=0)
-    chords /= np.linalg.norm(chords, axis=1, keepdims=True)
+    lengths = np.linalg.norm(chords, axis=1, keepdims=True)
+    if lengths.sum() > 2000:
+        told = f"the curve is {lengths.sum():.4g} mm long"
+        raise InputError(f"{told}, outside 10..2000 mm: are its coordinates in mm?")
+    chords /= lengths
     folds = np.flatnonzero(np.sum(chords[:-1] * chords[1:], axis=1) < FOLD)
     if len(folds):
         raise InputError(
             f"the curve folds back on itself at point {at[folds[0] + 1] + 1}: no body does; are its points in"
             " order from base to tip?"
+        )
+    gap = np.linalg.norm(points[-1] - points[0])
+    if gap < STRIDE / 2 and len(at) > 3:
+        raise InputError(
+            f"the curve is closed: its last point lies {gap:.3g} mm from its first, and base and tip of a"
+            f" body are at least {STRIDE / 2:g} mm apart: leave out its end"
         )
 
 

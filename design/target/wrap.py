@@ -43,7 +43,9 @@ class WrapPath(Checked):
 class Surface(Protocol):
     """What a path is laid on."""
 
-    stations: int
+    @property
+    def stations(self) -> int:
+        """Of a path, before it is sampled evenly."""
 
     def offset(self, angle: np.ndarray, z: np.ndarray, standoff: float) -> np.ndarray:
         """(n, 3) points `standoff` mm outside of where the surface is at angles (n,) and heights (n,)."""
@@ -96,20 +98,23 @@ class Triangulated:
     stations: int = DENSE_ON_TRIANGLES
 
     def offset(self, angle: np.ndarray, z: np.ndarray, standoff: float) -> np.ndarray:
-        corners, normals = self.triangles, _corner_normals(self.triangles)
+        normals = _corner_normals(self.triangles)
+        low, high = self.triangles[:, :, 2].min(axis=1), self.triangles[:, :, 2].max(axis=1)
         out = np.empty((len(z), 3))
         for i, (a, height) in enumerate(zip(angle, z)):
             direction = np.array([np.cos(a), np.sin(a), 0.0])
-            found = _outermost(corners, np.array([0.0, 0.0, height]), direction)
+            near = np.flatnonzero((low <= height) & (height <= high))
+            found = _outermost(self.triangles[near], np.array([0.0, 0.0, height]), direction)
             if found is None:
                 told = f"angle {np.degrees(a):.4g} deg, z = {height:.4g} mm"
                 raise InputError(
                     f"no surface at {told}: does the z axis run through the body, and is z_mm on it?"
                 )
-            face, weights = found
+            face, weights = near[found[0]], found[1]
             normal = weights @ normals[face]
             normal /= np.linalg.norm(normal)
-            out[i] = weights @ corners[face] + standoff * normal * (1 if normal @ direction > 0 else -1)
+            outward = 1 if normal @ direction > 0 else -1  # whichever way the triangles are turned
+            out[i] = weights @ self.triangles[face] + standoff * outward * normal
         return out
 
 
@@ -141,7 +146,7 @@ def _outermost(triangles, origin, direction):
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     across = np.cross(direction, second)
     det = np.sum(first * across, axis=1)
-    safe = np.where(abs(det) > 1e-12 * abs(det).max(), det, np.inf)
+    safe = np.where(abs(det) > 1e-12 * abs(det).max(initial=0), det, np.inf)
     from_corner = origin - triangles[:, 0]
     u = np.sum(from_corner * across, axis=1) / safe
     turned = np.cross(from_corner, first)
