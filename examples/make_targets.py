@@ -60,8 +60,7 @@ def pear_radius(z):
 
 
 #: name -> (radius of the surface, its slope, top, path): the offset is half the manipulator's width, so that
-#: the
-#: body lies on the surface
+#: the body lies on the surface
 WRAPS = {
     "vase": (vase_radius, lambda z: 14 * (z - 50) / 2500, 100, WrapPath(6.0, 0.9, z_range=(15, 85))),
     "pear": (

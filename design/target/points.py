@@ -8,8 +8,7 @@ from pneunet.geometry.designfile import FARTHEST
 #: more are not needed by any curve that a body can follow
 MOST_POINTS = 200_000
 #: mm of chord between the points that a fold and a closed curve are looked for by: about a body's width, so
-#: that
-#: noise is none
+#: that noise is none
 STRIDE = 10.0
 #: cosine of the turn from one such chord to the next that no body makes
 FOLD = np.cos(np.radians(150.0))

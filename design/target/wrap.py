@@ -16,8 +16,7 @@ from pneunet.base.quantities import Checked, quantity
 #: of a wrap, as of the shipped targets
 POINTS = 201
 #: points of a path before it is sampled evenly; the chords of the shipped wraps then miss their arc length by
-#: less
-#: than 1e-6 mm
+#: less than 1e-6 mm
 DENSE = 20001
 #: the same on triangles, where every point is a ray through all of them and facets are flat in any case
 DENSE_ON_TRIANGLES = 1001
