@@ -10,7 +10,6 @@ from pneunet.design.segmentation.rod import Rod, advance
 from pneunet.design.segmentation.windows import Stretch, Stretches
 from pneunet.design.target.extraction import turn_about_axis
 
-PRICE = 6.0  # of a strain or a joint, in units of the noise's variance; any from 4 to 20 serves
 FREE_FRAME = 5.0  # what a stretch's own frame explains more than a rod's continuous one would
 HALF_TURN = np.diag([1.0, -1.0, -1.0])
 
@@ -28,21 +27,22 @@ class _Part:
     after: np.ndarray
 
 
-def _options(stretch, variance, framed):
+def _options(stretch, variance, framed, price):
     """[(cost, (k1, k2) wanted)] of a stretch as straight, circle and helix."""
     square, (torsion, bend) = stretch.square / variance, stretch.wald / variance
     # without frames a straight stretch may have any torsion
     straight = bend + torsion if framed else bend
     return (
         (square + straight, (False, False)),
-        (square + torsion + PRICE, (False, True)),
-        (square + 2 * PRICE, (True, True)),
+        (square + torsion + price, (False, True)),
+        (square + 2 * price, (True, True)),
     )
 
 
-def chain(stretches: Stretches, noise: float) -> list[tuple[Stretch, np.ndarray]]:
+def chain(stretches: Stretches, noise: float, price: float) -> list[tuple[Stretch, np.ndarray]]:
     """The stretches, each with (2,) whether k1 and k2 are wanted, that together cover the curve at the least
-    price: dynamic programming over the cells. No two straight ones follow each other."""
+    price (of a strain and of half a joint, in units of the noise's variance): dynamic programming over the
+    cells. No two straight ones follow each other."""
     count = len(stretches.edges) - 1
     framed = stretches.frames is not None
     #: of every cell's end, by whether what ends there is straight: cost, stretch and what comes before it
@@ -52,10 +52,10 @@ def chain(stretches: Stretches, noise: float) -> list[tuple[Stretch, np.ndarray]
         by_end[stretch.last].append(stretch)
     for last in range(1, count + 1):
         for stretch in by_end[last]:
-            for cost, wanted in _options(stretch, noise**2, framed):
+            for cost, wanted in _options(stretch, noise**2, framed, price):
                 straight = not framed and not wanted[1]
                 for before, step in best[stretch.first].items():
-                    total = step[0] + cost + 2 * PRICE + FREE_FRAME
+                    total = step[0] + cost + 2 * price + FREE_FRAME
                     if not (straight and before) and total < best[last].get(straight, (np.inf,))[0]:
                         best[last][straight] = (total, stretch, np.array(wanted), before)
     found: list[tuple[Stretch, np.ndarray]] = []
@@ -83,10 +83,12 @@ def _parts(stretches, chosen):
     return parts
 
 
-def first_rods(data: Observations, stretches: Stretches, loose: tuple[float, ...]) -> list[Fit]:
+def first_rods(
+    data: Observations, stretches: Stretches, loose: tuple[float, ...], price: float
+) -> list[Fit]:
     """The chain's rods, not yet refined, one for each bound of `loose` (rad): where two curved pieces meet in
     planes further apart, modulo half a turn, a twisting piece is put between."""
-    chosen = chain(stretches, stretches.noise)
+    chosen = chain(stretches, data.noise, price)
     parts = _parts(stretches, chosen)
     rods, seen = [], set()
     for bound in loose:
