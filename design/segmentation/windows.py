@@ -80,7 +80,7 @@ class Stretches:
         self.feet = np.tile(s, (count, 1))
         self.noise = self.estimate = floor
         self.found: dict[tuple[int, int], Stretch] = {}
-        least = max(1, int(np.ceil(min(shortest, s[-1]) / (s[-1] / count) - 0.5)))
+        least = max(1, int(np.ceil(min(shortest, s[-1]) / (s[-1] / count) - 0.1)))
         self._start(s, least)
         active = np.arange(count)
         for cells in range(least, count + 1):
@@ -89,6 +89,9 @@ class Stretches:
             if cells == least:
                 self._fit(active, cells, FIRST_STEPS)
                 self._estimate_noise(floor)
+                # once more, now that it is known how much of the torsion is noise
+                self.strains[:, 0] = 0.0
+                self._fit(active, cells, FIRST_STEPS)
             elif len(active):
                 self._fit(active, cells, STEPS)
             fits = [self.found[a, a + cells] for a in active]
