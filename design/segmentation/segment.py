@@ -50,8 +50,8 @@ def fitted(
 ) -> Fit:
     """The `Fit` behind it, before conventions and words."""
     options = options or target.split
-    points, frames, block = _thinned(target.points, target.frames)
-    if block > 1:
+    points, frames, weights = _thinned(target)
+    if len(points) < len(target.points):
         log.info(words.thinned(len(target.points)))
     _, s = arc_lengths(points)
     length = float(s[-1])
@@ -64,17 +64,32 @@ def fitted(
         length,
         frames=frames,
         base=target.base_rotation,
+        weights=weights,
         shortest=shortest,
         reach=reach or {},
     )
     fit = found(data, stretches, options.most_pieces)
-    if not 0.8 < max(fit.noise, floor) / data.noise < 1.25:
-        # what the whole rod leaves is a better estimate than the shortest stretches'
-        data = replace(data, noise=max(fit.noise, floor))
+    said = _noise(fit, floor)
+    if said != (data.noise, data.lever):
+        # what the whole rod leaves says more than what the shortest stretches do
+        data = replace(data, noise=said[0], lever=said[1])
         again = found(data, stretches, options.most_pieces)
         kept = searched(Fit(data, fit.rod, fit.free, fit.feet), options.most_pieces)
         fit = min(again, kept, key=lambda f: f.criterion)
-    return _within_reach(fit)
+    return fit
+
+
+def _noise(fit, floor):
+    """(noise, lever) that a fit speaks for; those that were assumed where they will do, or where the points
+    are too far from any rod to say anything."""
+    noise, lever = fit.data.noise, fit.data.lever
+    left = max(fit.noise, floor)
+    if 0.5 < left / noise < 2.0 and not 0.8 < left / noise < 1.25:
+        noise = left
+    if fit.frame_noise > 1.5 * left:
+        # frames that are less certain than points are measured at a shorter lever
+        lever *= left / fit.frame_noise
+    return noise, lever
 
 
 def found(data: Observations, stretches: Stretches, most: int) -> Fit:
@@ -90,30 +105,28 @@ def found(data: Observations, stretches: Stretches, most: int) -> Fit:
         fit = searched(min(fits, key=lambda f: f.criterion), most)
         if best is None or fit.criterion < best.criterion:
             best = fit
-        left = data.values - len(best.columns)
-        if best.square / data.noise**2 < left + POOR * np.sqrt(2 * max(left, 1)):
+        if best.poor < POOR:
             break
     assert best is not None
     return best
 
 
-def _thinned(points, frames):
-    """(points, frames, how many points each is the mean of); of frames the middle one is kept."""
-    if len(points) <= MOST_POINTS:
-        return points, frames, 1
-    edges = np.linspace(0, len(points), THINNED + 1).astype(int)
-    means = np.add.reduceat(points, edges[:-1], axis=0) / np.diff(edges)[:, None]
-    middles = (edges[:-1] + edges[1:]) // 2
-    return means, None if frames is None else frames[middles], len(points) / THINNED
-
-
-def _within_reach(fit):
-    """With strains exactly within reach: the penalty lets them out by a little."""
-    if not fit.data.reach:
-        return fit
-    most = np.array([fit.data.reach.get(kind, (np.inf, np.inf)) for kind in fit.kinds])
-    strains = np.clip(fit.rod.strains, -most, most)
-    return Fit(fit.data, replace(fit.rod, strains=strains), fit.free, fit.feet)
+def _thinned(target):
+    """(points, frames, weights that are 1 on average or None): means of neighbours where there are many."""
+    points, frames, weights = target.points, target.frames, target.weights
+    if len(points) > MOST_POINTS:
+        edges = np.linspace(0, len(points), THINNED + 1).astype(int)
+        counts = np.diff(edges)
+        points = np.add.reduceat(points, edges[:-1], axis=0) / counts[:, None]
+        if weights is not None:
+            weights = np.add.reduceat(weights, edges[:-1]) / counts
+        if frames is not None:
+            sums = np.add.reduceat(frames.reshape(-1, 9), edges[:-1], axis=0).reshape(-1, 3, 3)
+            U, _, Vt = np.linalg.svd(sums)
+            frames = U @ Vt
+    if weights is not None:
+        weights = None if np.ptp(weights) == 0 else weights / weights.mean()
+    return points, frames, weights
 
 
 def _told(fit, target, options):
@@ -147,14 +160,14 @@ def _told(fit, target, options):
     errors[:, :2] = np.sqrt(variances).reshape(-1, 2)
     count = max(2, int(np.ceil((last - first) / SPACING)) + 1)
     curve = Curve(fit.rod.at(np.linspace(first, last, count)).points)
-    left = max(1, data.values - len(fit.columns) + 1)
-    noise = float(np.sqrt(fit.square / left * len(target.points) / len(data.points)))
+    noise = fit.noise if fit.poor < POOR else data.noise
+    noise *= np.sqrt(len(target.points) / len(data.points))
     return Segmentation(
         pieces,
         pose,
         np.column_stack([strains, np.zeros(len(pieces))]),
         errors,
-        noise,
+        float(noise),
         fit.rms,
         fit.criterion,
         curve,

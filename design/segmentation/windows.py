@@ -27,11 +27,14 @@ def arc_lengths(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     growth of squared distances with the index instead.
     """
     n = len(points)
-    stride = max(1, min(8, n // 12))
-    near, far = (
-        np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride)
-    )
-    spacing = np.sqrt(max(far - near, 1e-3 * far) / 3) / stride
+    spacing = 0.0
+    for stride in (1, 2, 4, 8):
+        if 2 * stride < n:
+            near, far = (
+                np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride)
+            )
+            # where the curve turns within a stride it seems too small
+            spacing = max(spacing, np.sqrt(max(far - near, 1e-3 * far) / 3) / stride)
     half = min(int(SMOOTH / spacing), (n - 1) // 2)
     if half < 2:
         smooth = points
