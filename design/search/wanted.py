@@ -14,6 +14,7 @@ from pneunet.geometry.parameters import TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
 
 GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"
+REFINED_NOTE = "split given by the user, refined"
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
 FAITHFUL = 2e-3
 
@@ -31,7 +32,7 @@ class Wanted:
 
 def wanted(target: Target, law: SegmentLaw) -> Wanted:
     """The Wanted of a Target: its own pieces, or those that it is split into."""
-    if target.pieces:
+    if target.pieces and not target.split.refine:
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
     split = segment(target, reach=reachable(target, law))
     followed, notes = target, split.notes
@@ -41,7 +42,7 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
         notes += (f"followed is the smooth curve: noise {split.noise:.2g} mm a coordinate; {told}",)
     scale = followed.length / split.length
     pieces = tuple(replace(p, length=p.length * scale) for p in _extracted(split, followed))
-    return Wanted(followed, pieces, FOUND_NOTE, notes)
+    return Wanted(followed, pieces, REFINED_NOTE if target.pieces else FOUND_NOTE, notes)
 
 
 def reachable(target: Target, law: SegmentLaw) -> dict[str, tuple[float, float]]:

@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from pneunet.base.curve import Curve
+from pneunet.base.frames import best_rigid_fit
 from pneunet.design.segmentation import words
 from pneunet.design.segmentation.fit import Fit, Observations, refined
-from pneunet.design.segmentation.search import allowed, searched
+from pneunet.design.segmentation.rod import Rod
+from pneunet.design.segmentation.search import POLISH, allowed, searched
 from pneunet.design.segmentation.segmentation import Segmentation
 from pneunet.design.segmentation.start import first_rods
 from pneunet.design.segmentation.windows import Stretches, arc_lengths
-from pneunet.design.target.target import Piece, SplitOptions, Target
+from pneunet.design.target.extraction import extract
+from pneunet.design.target.target import BENDING, HELICAL, Piece, SplitOptions, Target
+from pneunet.geometry.parameters import TWISTING
 
 FLOOR = 2e-4  # of the length: noise below it is not told from curvature that varies
 MOST_POINTS = 600  # more are thinned to means of neighbours
@@ -36,19 +40,20 @@ def segment(
 ) -> Segmentation:
     """The `Segmentation` of a target's points, and of its section frames and fixed base where it has them.
 
-    options: by default the target's own. reach: {kind of piece: (largest |twist|, largest curvature)} in 1/mm
+    options: by default the target's own. Pieces that the target has keep their kinds and order and are refined
+    from where they are. reach: {kind of piece: (largest |twist|, largest curvature)} in 1/mm
     of what can be built; a kind that is not named has no limits. Deterministic; some 0.05 s for 150 points.
     """
     options = options or target.split
-    return _told(fitted(target, options, reach), target, options)
+    return _told(*fitted(target, options, reach), target, options)
 
 
 def fitted(
     target: Target,
     options: SplitOptions | None = None,
     reach: Mapping[str, tuple[float, float]] | None = None,
-) -> Fit:
-    """The `Fit` behind it, before conventions and words."""
+) -> tuple[Fit, float]:
+    """The `Fit` behind it, before conventions and words, and the noise of what it was fitted to, mm."""
     options = options or target.split
     points, frames, weights = _thinned(target)
     if len(points) < len(target.points):
@@ -57,26 +62,46 @@ def fitted(
     length = float(s[-1])
     floor = FLOOR * length if options.tolerance is None else options.tolerance
     shortest = min(options.shortest, length)
-    stretches = Stretches(points, s, floor, shortest, frames)
     data = Observations(
         points,
-        stretches.noise,
+        floor,
         length,
         frames=frames,
         base=target.base_rotation,
         weights=weights,
         shortest=shortest,
-        reach=reach or {},
     )
-    fit = found(data, stretches, options.most_pieces)
-    said = _noise(fit, floor)
-    if said != (data.noise, data.lever):
-        # what the whole rod leaves says more than what the shortest stretches do
-        data = replace(data, noise=said[0], lever=said[1])
-        again = found(data, stretches, options.most_pieces)
-        kept = searched(Fit(data, fit.rod, fit.free, fit.feet), options.most_pieces)
-        fit = min(again, kept, key=lambda f: f.criterion)
-    return fit
+    stretches = Stretches(points, s, floor, shortest, frames)
+    data = replace(data, noise=stretches.noise)
+    if target.pieces:
+        fit = refined(_given(target, data, s), POLISH, 1e-4)
+    else:
+        fit = found(data, stretches, options.most_pieces)
+        said = _noise(fit, floor)
+        if said != (data.noise, data.lever):
+            # what the whole rod leaves says more than what the shortest stretches do
+            data = replace(data, noise=said[0], lever=said[1])
+            again = found(data, stretches, options.most_pieces)
+            kept = searched(replace(fit, data=data), options.most_pieces)
+            fit = min(again, kept, key=lambda f: f.criterion)
+    noise = fit.noise if fit.poor < POOR else data.noise
+    if reach and (abs(fit.rod.strains) > replace(fit, data=replace(data, reach=reach)).most).any():
+        # the curve says what it is made of, what can be reached how nearly it is met
+        for _ in range(2):
+            fit = refined(replace(fit, data=replace(data, reach=reach)), POLISH, 1e-4)
+            data = replace(data, noise=max(noise, fit.noise))
+    return fit, noise
+
+
+def _given(target, data, s):
+    """The `Fit` of the target's own pieces where the best rigid motion puts them."""
+    pieces = extract(target, target.pieces)
+    strains = np.array([[p.twist, -p.curvature if p.roll == 180 else p.curvature] for p in pieces])
+    free = np.array([[p.kind in (TWISTING, HELICAL), p.kind in (BENDING, HELICAL)] for p in pieces])
+    ends = np.cumsum([p.length for p in pieces])
+    rod = Rod(np.eye(4), ends[:-1] * s[-1] / ends[-1], strains * free)
+    start = best_rigid_fit(rod.at(s).points, data.points, np.ones(len(s)))
+    return Fit(data, replace(rod, start=start), free, s)
 
 
 def _noise(fit, floor):
@@ -129,7 +154,7 @@ def _thinned(target):
     return points, frames, weights
 
 
-def _told(fit, target, options):
+def _told(fit, noise, target, options):
     """The `Segmentation` of the final fit, in the conventions that `words` tells."""
     data = fit.data
     free_base = data.frames is None and data.base is None
@@ -160,7 +185,6 @@ def _told(fit, target, options):
     errors[:, :2] = np.sqrt(variances).reshape(-1, 2)
     count = max(2, int(np.ceil((last - first) / SPACING)) + 1)
     curve = Curve(fit.rod.at(np.linspace(first, last, count)).points)
-    noise = fit.noise if fit.poor < POOR else data.noise
     noise *= np.sqrt(len(target.points) / len(data.points))
     return Segmentation(
         pieces,

@@ -40,7 +40,7 @@ def told(fit: Fit, pieces: Sequence[Piece], target: Target, options: SplitOption
                 " taken; half a turn more is the same curve with all that follows rolled by 180 deg"
             )
     yield from _limits(fit, pieces)
-    if fit.poor > NOTED:
+    if fit.poor > NOTED and not data.reach:
         worst = int(np.argmax(np.sum(fit.away[:, 1:] ** 2, axis=1)))
         away = float(np.linalg.norm(fit.away[worst, 1:]))
         yield (
@@ -67,7 +67,7 @@ def _limits(fit, pieces):
             if limit > 0 and value >= (1 - AT_LIMIT) * limit:
                 on.append(f"the {name} of piece {i} to {limit / PER_MM_PER_M:.3g} {unit}")
     if on:
-        free = refined(Fit(replace(fit.data, reach={}), fit.rod, fit.free, fit.feet))
+        free = refined(replace(fit, data=replace(fit.data, reach={})))
         yield (
             f"given up for what can be reached: {', '.join(on)}; RMS {fit.rms:.3g} mm instead of"
             f" {free.rms:.3g} mm"
