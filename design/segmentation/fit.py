@@ -19,7 +19,8 @@ from pneunet.geometry.parameters import TWISTING
 
 LEVER = 5.0  # mm, half a usual width, at which turns of a section frame are measured
 STRAIN = 0.03  # 1/mm, standard deviation of strains before any point is seen
-TOO_SHORT = 0.1  # mm by which a piece is too short that counts as one
+#: mm by which a piece is too short that counts as one standard deviation: in the search, at its end
+SOFT, FIRM = 0.1, 0.01
 PIECE = 4.0  # price of a piece in the criterion, -2 log of its prior odds
 #: largest steps: rad, mm (start and joints), 1/mm
 CAPS = (0.5, 20.0, 0.02)
@@ -36,7 +37,7 @@ KINDS = {
 class Observations:
     """points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and, where given, frames (n, 3, 3)
     and the section frame base (3, 3) at the first point; weights (n,), 1 on average. lever: mm at which their turns are measured.
-    shortest: length of a piece, mm. reach: {kind: (largest
+    shortest: length of a piece, mm, which slack lets it miss. reach: {kind: (largest
     |k1|, largest |k2|)} in 1/mm; a kind that is not named has no limits."""
 
     points: np.ndarray
@@ -47,6 +48,7 @@ class Observations:
     weights: np.ndarray | None = None
     lever: float = LEVER
     shortest: float = 20.0
+    slack: float = SOFT
     reach: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -156,9 +158,9 @@ class Fit:
                     row = np.zeros(size)
                     row[5 + i] = -1.0 if i > 0 else 0.0
                     row[6 + i] = 1.0 if i < n - 1 else 0.0
-                    cost += (lacking / TOO_SHORT) ** 2
-                    gradient += row * lacking / TOO_SHORT**2
-                    curvature += np.outer(row, row) / TOO_SHORT**2
+                    cost += (lacking / data.slack) ** 2
+                    gradient += row * lacking / data.slack**2
+                    curvature += np.outer(row, row) / data.slack**2
         return cost, gradient, curvature
 
     @property

@@ -6,11 +6,11 @@ say of dropping it (Wald's test), by the slope of the cost by what is not free y
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneunet.design.segmentation.fit import STRAIN, Fit, capped, refined
+from pneunet.design.segmentation.fit import FIRM, STRAIN, Fit, capped, refined
 from pneunet.design.segmentation.rod import Rod
 
 TRIES = 20  # moves tried before a rod is taken for the best
@@ -18,7 +18,7 @@ HOPE = -8.0  # predicted gain below which a move is not tried
 BETTER = 0.02  # of the criterion: a smaller gain is none
 CUT = 5.0  # mm between the places at which a piece may be cut
 ROUNDS = 40
-SLACK = 0.3  # mm by which a piece may be too short
+SHORT = 0.5  # mm by which a piece may be too short
 POLISH = 60  # steps of the last refinement
 SHIFT = 10.0  # mm by which a joint is displaced to see whether it settles in a better place
 
@@ -51,12 +51,19 @@ def searched(fit: Fit, most: int) -> Fit:
     while len(fit.free) > most:
         fit = _fewer(fit, range(len(fit.free)))
     while True:
-        fit = _climbed(fit, most)
-        short = np.flatnonzero(fit.lengths < fit.data.shortest - SLACK)
-        if len(fit.free) == 1 or not len(short):
-            return refined(fit, POLISH, 1e-4)
-        fit = _fewer(fit, short)
+        fit = refined(_climbed(fit, most), POLISH, 1e-4)
+        if len(fit.free) == 1 or not len(_short(fit)):
+            return fit
+        firm = refined(replace(fit, data=replace(fit.data, slack=FIRM)), POLISH, 1e-2)
+        if not len(_short(firm)):
+            return firm
+        fit = _fewer(fit, _short(fit))
         most = len(fit.free)
+
+
+def _short(fit):
+    """Indices of pieces that are too short to be built."""
+    return np.flatnonzero(fit.lengths < fit.data.shortest - SHORT)
 
 
 def _fewer(fit, pieces):
