@@ -17,6 +17,7 @@ from benchmarks import (
     chain,
     contact,
     contact_page,
+    design,
     door,
     house,
     kills,
@@ -80,6 +81,10 @@ PARTS = {
     ),
     "people": (people.people, "files as people bring them against the right answer of each; some minutes"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
+    "design": (
+        design.design,
+        "designs of random targets and of the paper's raw curves, seconds, derivatives; some 15 minutes",
+    ),
     "remeshed": (
         remeshed.remeshed,
         "held-out cells on another mesh of the same size, against the law's errors; some 15 minutes",
