@@ -35,7 +35,7 @@ def _members(about, names):
 
 
 @dataclass(frozen=True)
-class TaggedMesh:
+class VolumeMesh:
     """points (n, 3) in mm; cells (m, 4) or (m, 8) and tagged facets (k, 3) or (k, 4) as numbers of points,
     with their tags (m,) and (k,) of geometry.tags.
 
@@ -83,11 +83,11 @@ class TaggedMesh:
         write_archive(path, SCHEMA, {"element": self.element, **facts}, asdict(self), compress=True)
 
 
-def read_mesh(path: str | Path) -> tuple[TaggedMesh, dict[str, Any]]:
+def read_mesh(path: str | Path) -> tuple[VolumeMesh, dict[str, Any]]:
     """(mesh, facts) of an .npz; InputError naming the file where it is damaged or no mesh."""
     facts, stored = read_archive(path, SCHEMA, "a mesh", AGAIN, {"element": str}, _members)
     with located(path):
-        mesh = TaggedMesh(
+        mesh = VolumeMesh(
             **{
                 name: values.astype(np.float64 if name == "points" else np.int64)
                 for name, values in stored.items()

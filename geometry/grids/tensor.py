@@ -6,7 +6,7 @@ import numpy as np
 
 from pneunet.geometry import tags
 from pneunet.geometry.hexahedra import CORNERS
-from pneunet.geometry.meshfile import TaggedMesh
+from pneunet.geometry.meshfile import VolumeMesh
 
 #: what a cell holds: nothing, the channel's air or that of a chamber; else a tag of geometry.tags
 EMPTY, CHANNEL_AIR, CAVITY_AIR = 0, 1, 2
@@ -32,14 +32,14 @@ class TensorGrid:
     kinds: np.ndarray
     ends: dict[tuple[int, int], int | None]
 
-    def mesh(self, air: bool = False) -> TaggedMesh:
+    def mesh(self, air: bool = False) -> VolumeMesh:
         """The solid and the gaps that are meshed, with its air or without."""
         kept = (self.kinds > CAVITY_AIR) | (air & (self.kinds > EMPTY))
         kinds = np.where(self.kinds > CAVITY_AIR, self.kinds, tags.AIR)
         cells = self._numbers(np.argwhere(kept), CORNERS)
         facets, facet_tags = zip(*(self._facets(axis) for axis in range(3)))
         used, cells = np.unique(cells, return_inverse=True)
-        return TaggedMesh(
+        return VolumeMesh(
             self.points.reshape(-1, 3)[used],
             cells.reshape(-1, 8),
             kinds[kept],

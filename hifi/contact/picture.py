@@ -30,7 +30,7 @@ def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> b
         distances = node_distances(CellWalls(problem), state.array)
     finally:
         problem.strains.value[:] = kept
-    facets = surface.facet_nodes(problem, tags.OUTER)
+    facets = surface.wall_triangles(problem, tags.OUTER)
     of_facets = distances[facets]
     facing = np.isfinite(of_facets).all(axis=1)
     if not facing.any():

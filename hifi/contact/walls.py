@@ -51,7 +51,7 @@ class WallDistances:
 
     def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
-        facets = surface.facet_nodes(problem, tags.OUTER)
+        facets = surface.wall_triangles(problem, tags.OUTER)
         corners = problem.nodes[facets[:, :3]]
         self.facets, wall_of_facet, self.gaps = [], [], []
         wall = 0
@@ -116,7 +116,7 @@ class CellWalls:
 
     def __init__(self, problem: MixedField):
         self.problem, s = problem, problem.segment
-        facets = surface.facet_nodes(problem, tags.OUTER)
+        facets = surface.wall_triangles(problem, tags.OUTER)
         corners = problem.nodes[facets[:, :3]]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         slope = normal[:, 0] / np.linalg.norm(normal, axis=1)

@@ -110,7 +110,7 @@ def scatter_add(function: fem.Function) -> None:
 
 
 class _Gmsh:
-    """What gmshio asks of a gmsh model, answered from a TaggedMesh: each tag a group with one part."""
+    """What gmshio asks of a gmsh model, answered from a VolumeMesh: each tag a group with one part."""
 
     #: gmsh's number, name and corners of cells and facets
     _KINDS = {
@@ -118,7 +118,7 @@ class _Gmsh:
         "hexahedra": {3: (5, "Hexahedron 8", 8), 2: (3, "Quadrilateral 4", 4)},
     }
 
-    def __init__(self, content: meshfile.TaggedMesh):
+    def __init__(self, content: meshfile.VolumeMesh):
         self.content, self.mesh = content, self
         self.kinds = self._KINDS[content.element]
         self.groups = {
@@ -150,7 +150,7 @@ class _Gmsh:
 
 def read_mesh(path: Path | str, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTags]:
     """(mesh, cell tags, facet tags) of an .npz, read on rank 0 and distributed; InputError on all ranks."""
-    read: list[meshfile.TaggedMesh] = []
+    read: list[meshfile.VolumeMesh] = []
     on_rank_0(comm, lambda: read.append(meshfile.read_mesh(path)[0]))
     return model_to_mesh(_Gmsh(*read) if read else None, comm)
 

@@ -6,7 +6,7 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.base.files.archive import write_archive
 from pneunet.geometry import tags
-from pneunet.geometry.meshfile import SCHEMA, TaggedMesh, read_mesh
+from pneunet.geometry.meshfile import SCHEMA, VolumeMesh, read_mesh
 
 CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 GOOD = {
@@ -61,7 +61,7 @@ def test_hexahedra_are_read_and_refused_where_they_turn_inside_out(tmp_path):
     cube = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     cube = np.concatenate([cube, cube + [0, 0, 1]])
     cells, facets = np.arange(8)[None], np.array([[0, 3, 2, 1]])
-    made = TaggedMesh(cube, cells, np.array([tags.BODY]), facets, np.array([tags.BASE]))
+    made = VolumeMesh(cube, cells, np.array([tags.BODY]), facets, np.array([tags.BASE]))
     made.write(tmp_path / "mesh.npz", {"cells": 1})
     mesh, facts = read_mesh(tmp_path / "mesh.npz")
     assert facts == {"cells": 1} and mesh.element == "hexahedra" and (mesh.cells == cells).all()
@@ -69,7 +69,7 @@ def test_hexahedra_are_read_and_refused_where_they_turn_inside_out(tmp_path):
     dented = cube.copy()
     dented[6] = [0.4, 0.4, 0.4]  # still of positive volume, but not at this corner
     with pytest.raises(InputError, match="hexahedra has no positive volume"):
-        TaggedMesh(dented, cells, made.cell_tags, facets, made.facet_tags)
+        VolumeMesh(dented, cells, made.cell_tags, facets, made.facet_tags)
 
 
 def test_an_unknown_element_is_refused(tmp_path):
