@@ -127,7 +127,7 @@ class _Section:
         half = np.array([s.width, s.channel_width]) / 2
         own = (
             _Axis(sideways(s), [-half[0], -half[1], half[1], half[0]]),
-            _Axis(upright(s), [s.core_bottom, -s.channel_height / 2, s.channel_height / 2, s.core_top]),
+            _Axis(upright(s, size), [s.core_bottom, -s.channel_height / 2, s.channel_height / 2, s.core_top]),
         )
         self._axes = []
         for row in np.rint(_turn(s)).astype(int):

@@ -6,8 +6,10 @@ import numpy as np
 from pneunet.geometry import tags
 from pneunet.geometry.grids.planes import along, lean, sideways, snapped, upright
 from pneunet.geometry.grids.tensor import CAVITY_AIR, CHANNEL_AIR, EMPTY, TensorGrid
-from pneunet.geometry.parameters import TWISTING, Segment
+from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 
+#: kind -> diagonals of the half turns, about axes through a chamber's middle, that take a cell to itself
+HALF_TURNS = {ONE_SIDED: ((-1, -1, 1),), TWISTING: ((-1, -1, 1), (1, -1, -1), (-1, 1, -1))}
 
 def cell_grid(
     segment: Segment, size: float, layer: float | None = None, gaps: bool = False, part: bool = False
@@ -16,7 +18,8 @@ def cell_grid(
     most `size` mm.
 
     layer (mm): one element of this thickness on each side of every plane in which stresses are singular.
-    gaps: the room between the chambers is meshed too. part: only xi >= 0, and of a twisting cell only y >= 0.
+    gaps: the room between the chambers is meshed too. part: only xi >= 0, and of a twisting cell only y >= 0:
+    HALF_TURNS make the rest.
     """
     s = snapped(segment)
     twisting = s.kind == TWISTING
@@ -26,7 +29,7 @@ def cell_grid(
     y = sideways(s, middle=twisting).divided(size, layer)
     if part and twisting:
         y = y[y > -1e-9]
-    z = upright(s).divided(size, layer)
+    z = upright(s, size).divided(size, layer)
     middles = [(a[1:] + a[:-1]) / 2 for a in (xi, y, z)]
     kinds = contents(s, *np.meshgrid(*middles, indexing="ij", sparse=True), gaps=gaps)
     ends: dict[tuple[int, int], int | None] = {(0, -1): None, (0, 1): None}

@@ -65,8 +65,8 @@ def node_distances(walls: CellWalls, array: np.ndarray) -> np.ndarray:
     out = np.full(len(walls.problem.nodes), np.nan)
     for pair in walls.gaps:
         placed = [walls.positions(wall, array) for wall in pair]
-        for (facets, _), own, other in zip(pair, placed, placed[::-1]):
-            np.fmin.at(out, facets.ravel(), distances_from(other, own.reshape(-1, 3)))
+        for wall, own, other in zip(pair, placed, placed[::-1]):
+            np.fmin.at(out, wall.facets.ravel(), distances_from(other, own.reshape(-1, 3)))
     return out
 
 
