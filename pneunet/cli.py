@@ -85,6 +85,16 @@ def train(a: Namespace) -> None:
             run_training(a.data, out, not a.no_comparison, mapping, a.like)
 
 
+def workspace(a: Namespace) -> None:
+    from pneunet.design.workspace import run_workspace
+    from pneunet.reduced.choice import choose_law
+
+    with rank_map() as mapping:
+        if mapping:  # other ranks have worked for this one
+            name = a.workspace.stem if a.workspace else "workspace"
+            run_workspace(a.workspace, a.output or Path("out") / name, choose_law(a.law), mapping)
+
+
 def report(a: Namespace) -> None:
     from pneunet.front import report as write
 
@@ -112,6 +122,7 @@ def doctor(a: Namespace) -> int:
 COMMANDS = {
     "design": design,
     "shape": shape,
+    "workspace": workspace,
     "mesh": mesh,
     "solve": solve,
     "cell": cell,
