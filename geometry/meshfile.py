@@ -39,8 +39,8 @@ class VolumeMesh:
     """points (n, 3) in mm; cells (m, 4) or (m, 8) and tagged facets (k, 3) or (k, 4) as numbers of points,
     with their tags (m,) and (k,) of geometry.tags.
 
-    Corners of a hexahedron go round its bottom, then round its top (gmsh, VTK). InputError where a cell has no
-    positive volume, a hexahedron not everywhere.
+    Corners of a hexahedron go round its bottom, then round its top (gmsh, VTK). InputError where a cell has
+    no positive volume, a hexahedron not everywhere.
     """
 
     points: np.ndarray

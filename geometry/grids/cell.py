@@ -11,6 +11,7 @@ from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 #: kind -> diagonals of the half turns, about axes through a chamber's middle, that take a cell to itself
 HALF_TURNS = {ONE_SIDED: ((-1, -1, 1),), TWISTING: ((-1, -1, 1), (1, -1, -1), (-1, 1, -1))}
 
+
 def cell_grid(
     segment: Segment, size: float, layer: float | None = None, gaps: bool = False, part: bool = False
 ) -> TensorGrid:

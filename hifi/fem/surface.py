@@ -130,8 +130,8 @@ def _collapsed(points):
 
 @dataclass(frozen=True)
 class FacetKind:
-    """corners: how many; turned: the nodes in the order of the other orientation. triangles (t, 3, 2) that its
-    reference shape is made of; barycentric (q, 3) and weights (q,) of a rule on each, exact for displacement
+    """corners: how many; turned: the nodes in the order of the other orientation. triangles (t, 3, 2) that
+    its reference shape is made of; barycentric (q, 3) and weights (q,) of a rule on each, exact for displacement
     times place."""
 
     corners: int
@@ -162,12 +162,8 @@ class FacetKind:
 _SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 #: nodes of a facet -> its kind
 KINDS = {
-    6: FacetKind(
-        3, [0, 2, 1, 5, 4, 3], np.array([[[0, 0], [1, 0], [0, 1]]], float), _BARYCENTRIC, _WEIGHTS
-    ),
-    9: FacetKind(
-        4, [0, 3, 2, 1, 7, 6, 5, 4, 8], _SQUARE[[[0, 1, 2], [0, 2, 3]]], *_collapsed(5)
-    ),
+    6: FacetKind(3, [0, 2, 1, 5, 4, 3], np.array([[[0, 0], [1, 0], [0, 1]]], float), _BARYCENTRIC, _WEIGHTS),
+    9: FacetKind(4, [0, 3, 2, 1, 7, 6, 5, 4, 8], _SQUARE[[[0, 1, 2], [0, 2, 3]]], *_collapsed(5)),
 }
 
 
@@ -202,8 +198,8 @@ def _clip(polygon, values, keep_below):
 
 
 class SlabIntegral:
-    """Integrals over the part of a surface with low <= X1 <= high, as weights on its nodes; exact where facets
-    are flat and have parallel edges.
+    """Integrals over the part of a surface with low <= X1 <= high, as weights on its nodes; exact where
+    facets are flat and have parallel edges.
 
     area (mm2); centre (3,) = int X dA; nodes (n,); weights (n,) = int N dA; first (n, 3) = int X N dA.
     places (all local nodes, 3): of the nodes, when they are not the problem's own.
