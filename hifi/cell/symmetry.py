@@ -182,7 +182,9 @@ class SymmetryClass:
         self.gauge, self.gauge_strains = gauge[:, self._conditions], strains[self._conditions]
         self._pattern: BorderedPattern | None = None
 
-    def bordered(self, matrix: Any, rows=(), columns=(), values=()) -> sp.csr_matrix:
+    def bordered(
+        self, matrix: Any, rows: Sequence = (), columns: Sequence = (), values: Sequence = ()
+    ) -> sp.csr_matrix:
         """The unknowns' matrix bordered by the gauge, of that of the mixed space and of entries of the
         unknowns."""
         if self._pattern is None:
@@ -225,7 +227,9 @@ class BorderedPattern:
         self._indices = (self._keys % self._size).astype(np.int32)
         self._indptr = np.searchsorted(self._keys, self._size * np.arange(self._size + 1)).astype(np.int32)
 
-    def filled(self, data, rows=(), columns=(), values=()):
+    def filled(
+        self, data: np.ndarray, rows: Sequence = (), columns: Sequence = (), values: Sequence = ()
+    ) -> sp.csr_matrix:
         """CSR matrix of the values `data` of the mixed space's matrix and of entries (row, column, value) of
         the unknowns.
 
