@@ -1,6 +1,7 @@
 """Numbers that no move of code may change: `python -m tests.reference_outputs OUT.json` writes them.
 
-tests/data/reference_outputs.json was written before the packages were moved under one name.
+tests/data/reference_outputs.json was written before the packages were moved under one name. Finite elements
+are solved on meshes that are stored, because gmsh's differ from one processor to another.
 """
 
 import json
@@ -17,6 +18,8 @@ from pneunet.reduced import choose_law, predict
 from pneunet.reduced.choice import DATA_SET
 
 STORED = Path(__file__).resolve().parent / "data" / "reference_outputs.json"
+#: mesh_cell(CASES["one_sided_w10"](60.0, 1), 3.0)
+CELL_MESH = STORED.with_name("reference_cell.npz")
 #: (case, angle in degrees) of the free strains, and pressures in kPa
 STATES = (
     (("one_sided_w10", 60.0), ("twist_w12", 60.0)),
@@ -71,13 +74,18 @@ def held_out_figures():
 
 def cell():
     """A unit cell of 3 mm at 20 kPa: strains, volume (mm3) and stiffness (N, N mm, N mm2)."""
-    from pneunet.hifi.cell.file import CellCase
-    from pneunet.hifi.cell.run import solve_cell
+    from pneunet.hifi.cell.problem import CellProblem
+    from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+    from pneunet.hifi.path.control import LoadControl
+    from pneunet.hifi.path.equilibrium import EquilibriumPath
+    from pneunet.hifi.path.newton import NewtonOptions
+    from pneunet.hifi.path.stepping import StepSize, run_steps
 
-    with tempfile.TemporaryDirectory() as folder:
-        state, _ = solve_cell(
-            CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1), Path(folder) / "cell.npz"
-        )
+    system = CellSystem(CellProblem(CASES["one_sided_w10"](60.0, 1), CELL_MESH))
+    path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    run_steps(path, 0.02, StepSize(0.005, 1e-4))
+    state = system.measure()
+    system.destroy()
     strains = state.strains.vector.tolist()
     return {"strains": strains, "volume_mm3": state.volume, "stiffness": state.stiffness.tolist()}
 
@@ -91,12 +99,13 @@ def body():
 
 
 def reduced_outputs():
-    """What numpy and scipy alone compute."""
-    return {
-        "free strains": free_strains(),
-        "centrelines": centrelines(),
-        "held-out figures": held_out_figures(),
-    }
+    """Shapes, which numpy and scipy alone compute."""
+    return {"free strains": free_strains(), "centrelines": centrelines()}
+
+
+def errors():
+    """Differences of nearly equal numbers: another processor's rounding moves them by 5e-9 of themselves."""
+    return {"held-out figures": held_out_figures()}
 
 
 def finite_element_outputs():
@@ -116,5 +125,5 @@ def largest_difference(one, two):
 
 if __name__ == "__main__":
     Path(sys.argv[1]).write_text(
-        json.dumps(reduced_outputs() | finite_element_outputs(), default=float) + "\n"
+        json.dumps(reduced_outputs() | errors() | finite_element_outputs(), default=float) + "\n"
     )

@@ -15,5 +15,9 @@ def test_reduced_models():
     assert largest_difference(reference_outputs.reduced_outputs()) < 1e-10
 
 
+def test_errors_of_the_law():
+    assert largest_difference(reference_outputs.errors()) < 1e-8
+
+
 def test_finite_elements():
     assert largest_difference(reference_outputs.finite_element_outputs()) < 1e-8
