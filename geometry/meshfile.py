@@ -18,7 +18,7 @@ MEMBERS = {
     "tetrahedra": Member("i", ("tetrahedra", 4), 0, "points"),
     "tetrahedron_tags": Member("i", ("tetrahedra",), tags.BODY, tags.GAP + 1),
     "facets": Member("i", ("facets", 3), 0, "points"),
-    "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.OUTER + 1),
+    "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.LAST_FACE + 1),
 }
 
 
