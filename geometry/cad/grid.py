@@ -53,7 +53,7 @@ def save_grid(path: Path, mesh: VolumeMesh, facts: dict[str, Any]) -> None:
                     gmsh.model.mesh.addNodes(dim, tag, numbers, mesh.points.ravel())
                 gmsh.model.mesh.addElementsByType(tag, kind, [], (rows[of == tag] + 1).ravel())
                 gmsh.model.addPhysicalGroup(dim, [tag], tag)
-        for tag, name in tags.FACE_NAMES.items():
+        for tag, name in tags.face_names(tags.MOST_GROUPS).items():
             gmsh.model.setPhysicalName(2, tag, name)
         for tag in np.unique(mesh.cell_tags).tolist():
             gmsh.model.setPhysicalName(3, tag, _called(tag))

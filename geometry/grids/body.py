@@ -15,7 +15,7 @@ import numpy as np
 from pneunet.geometry import tags
 from pneunet.geometry.grids.cell import contents
 from pneunet.geometry.grids.planes import SNAP, Planes, along, lean, sideways, snapped, upright
-from pneunet.geometry.grids.tensor import CHANNEL_AIR, TensorGrid
+from pneunet.geometry.grids.tensor import AIR_OF_GROUP, CHANNEL_AIR, EMPTY, TensorGrid
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.geometry.sections import rotation
 
@@ -199,6 +199,7 @@ class _Part:
         middles = [(d[1:] + d[:-1]) / 2 for d in distances]
         solid = np.logical_or(*(m < end.solid for m, end in zip(middles, self.ends)))
         kinds[solid[:, None, None] & (kinds == CHANNEL_AIR)] = self.tag
+        kinds[(kinds > EMPTY) & (kinds < tags.BODY)] += AIR_OF_GROUP * (s.group - 1)
         return points, kinds
 
     def _joint(self, other, axis, own_end, other_end):

@@ -51,8 +51,8 @@ class CellProblem(MixedField):
     section frame; centre: X1 (mm) where that frame sits, in the middle of the pitch over which it is fitted.
     rollers: {facet tag: component of u that is zero}. contact: the hifi.contact.penalty.WallPenalty between
     the walls of the gaps. medium: or a hifi.contact.medium.ThirdMedium that fills the gaps, which must be
-    meshed then; without it, meshed gaps are void. Where the mesh is a part of the cell from which half turns make
-    the rest (geometry.grids.cell), states have this symmetry.
+    meshed then; without it, meshed gaps are void. Where the mesh is a part of the cell from which half turns
+    make the rest (geometry.grids.cell), states have this symmetry.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
-"""The unknowns of a cell: what periodicity and half turns leave of the nodes' values, one class of symmetry at
-a time.
+"""The unknowns of a cell: what periodicity and half turns leave of the nodes' values, in one class of
+symmetry at a time.
 
 Half turns R about the axes take the body to itself. Deformations fall into classes: in each, a half turn
 takes u(X) to chi R u(X) with a sign chi of its own, and the strains of one class do not move the others'. A

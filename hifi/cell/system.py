@@ -204,7 +204,7 @@ class CellSystem:
         return self._update.corrected(self._solve(right[:, None])[:, 0])
 
     def solve_inner(self, right: np.ndarray) -> np.ndarray:
-        """Inverse of the factorised tangent at held strains times right (rows of unknowns and multipliers)."""
+        """Inverse of the factorised tangent at held strains times right (unknowns and multipliers, n)."""
         return self._solver.solve_many(right)
 
     def _solve(self, right):
