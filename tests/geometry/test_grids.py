@@ -162,6 +162,16 @@ def test_a_taper_is_a_frustum():
     assert body_grid(body, 1.5).mesh().volumes().sum() == pytest.approx(exact, rel=1e-12)
 
 
+def test_a_joint_of_sections_that_are_rolled_against_each_other_keeps_either_segment():
+    """The twisting segment's chambers stand out sideways, where the one-sided has nothing."""
+    a = CASES["one_sided_w10"](60.0, 2)
+    b = replace(CASES["twist_w12"](60.0, 1), width=6.0, roll=90, channel_width=2.0)
+    volumes = [body_grid(Manipulator(m), 2.0).mesh().volumes().sum() for m in ([a], [b], [a, b])]
+    plugs = sum(s.channel_width * s.channel_height * s.end_wall for s in (a, b))
+    # but for the tapers, which keep each dimension's volume and not quite their product's
+    assert volumes[2] == pytest.approx(volumes[0] + volumes[1] - plugs, abs=0.01 * volumes[2])
+
+
 @pytest.mark.parametrize("roll", [90, 180, 270])
 def test_a_rolled_segment_is_the_turned_one(roll):
     s = replace(CASES["one_sided_w10"](60.0, 2), layer_thickness=0.5, layer_material=NeoHookean(1.0))
