@@ -9,6 +9,7 @@ from pneunet.geometry import tags
 from pneunet.geometry.cad.grid import grid_cell
 from pneunet.geometry.reference_cases import CASES
 from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.shape_slopes import ShapeSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.fem import surface
 from pneunet.hifi.path.control import LoadControl
@@ -39,7 +40,7 @@ def solved(problem, pressure):
 def test_a_part_of_the_cell_and_half_turns_are_the_cell(name, copies, tmp_path):
     """Its free state, its stiffness, for which perturbations without the symmetry are needed, and what is
     measured on images of its walls."""
-    (whole, facts), (part, of_part) = (problem_of(name, tmp_path, part=p) for p in (False, True))
+    (whole, facts), (part, of_part) = (problem_of(name, tmp_path, 4.0, part=p) for p in (False, True))
     assert of_part["cells"] * copies == facts["cells"]
     assert of_part["air_mm3"] == pytest.approx(facts["air_mm3"])
     assert sum(c.unknowns + c.gauge.shape[1] for c in part.classes) == whole.unknowns + 6
@@ -67,6 +68,21 @@ def test_all_classes_count_unstable_directions(tmp_path):
         counts.append(system.measure().unstable)
         system.destroy()
     assert counts[0] == counts[1] > 0
+
+
+def test_a_part_of_the_cell_has_the_whole_s_derivatives_by_the_shape(tmp_path):
+    """Of the strains and of all of the stiffness, whose entries belong to different classes."""
+    slopes = []
+    for part in (False, True):
+        problem, _ = problem_of("one_sided_w10", tmp_path, 6.0, part)
+        system = CellSystem(problem)
+        path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+        run_steps(path, 0.005, StepSize(first=0.005, smallest=1e-4))
+        system.factorise()
+        slopes.append(ShapeSlopes(problem).of(system))
+        system.destroy()
+    for whole, part in zip(*slopes):
+        assert part == pytest.approx(whole, rel=1e-3, abs=1e-4 * np.abs(whole).max())
 
 
 def test_the_tangent_is_the_slope_of_the_residual(tmp_path):
