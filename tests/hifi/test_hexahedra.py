@@ -52,7 +52,9 @@ def test_a_part_of_the_cell_and_half_turns_are_the_cell(name, copies, tmp_path):
             for attribute in of.split("."):
                 value = getattr(value, attribute)
             values.append(value)
-        assert values[1] == pytest.approx(values[0], rel=1e-6, abs=1e-7 * np.abs(values[0]).max()), of
+        # a wall is seen as triangles, whose diagonals are no images of each other
+        tolerance = 1e-3 if of == "wall_distance" else 1e-6
+        assert values[1] == pytest.approx(values[0], rel=tolerance, abs=1e-7 * np.abs(values[0]).max()), of
     e, k = states[1].strains.e, states[1].strains.k
     zero = [e[2], k[2]] if copies == 2 else [*e[1:], *k[1:]]
     assert not np.any(zero)
