@@ -18,6 +18,7 @@ from benchmarks import (
     contact,
     contact_page,
     door,
+    doubt,
     house,
     kills,
     law,
@@ -73,6 +74,10 @@ PARTS = {
             "the trained law that comes along: errors on designs it has not seen, the laws compared, cost;"
             " some seconds"
         ),
+    ),
+    "doubt": (
+        doubt.doubt,
+        "the law's doubt: cost, agreement with the exact deviation; `pneunet shape` of the demo; a minute",
     ),
     "silicones": (
         silicones.silicones,
