@@ -73,7 +73,7 @@ def segmentation(count: int | None = None, noise: float = NOISE, seed: int | Non
     right, optimal, kinds, off, rms, seconds, wrong = [], [], [], [], [], [], []
     for i, target in enumerate(targets):
         started = time.process_time()
-        fit = fitted(Target(target.points))
+        fit, _ = fitted(Target(target.points))
         seconds.append(time.process_time() - started)
         truth = _truth(target, fit.data)
         right.append(len(fit.kinds) == len(target.kinds))

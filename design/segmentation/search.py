@@ -6,11 +6,11 @@ say of dropping it (Wald's test), by the slope of the cost by what is not free y
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneunet.design.segmentation.fit import STRAIN, Fit, capped, refined
+from pneunet.design.segmentation.fit import FIRM, STRAIN, Fit, capped, refined
 from pneunet.design.segmentation.rod import Rod
 
 TRIES = 20  # moves tried before a rod is taken for the best
@@ -18,17 +18,19 @@ HOPE = -8.0  # predicted gain below which a move is not tried
 BETTER = 0.02  # of the criterion: a smaller gain is none
 CUT = 5.0  # mm between the places at which a piece may be cut
 ROUNDS = 40
+SHORT = 0.5  # mm by which a piece may be too short
 POLISH = 60  # steps of the last refinement
 SHIFT = 10.0  # mm by which a joint is displaced to see whether it settles in a better place
 
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A change with its predicted gain in the criterion."""
+    """A change, at or behind a piece, with its predicted gain in the criterion."""
 
     name: str
     gain: float
     made: Callable[[], Fit]
+    piece: int = 0
 
 
 def allowed(free: np.ndarray, framed: bool, based: bool) -> bool:
@@ -44,7 +46,41 @@ def allowed(free: np.ndarray, framed: bool, based: bool) -> bool:
 
 
 def searched(fit: Fit, most: int) -> Fit:
-    """The best rod that moves from a refined one lead to, with at most `most` pieces."""
+    """The best rod that moves from a refined one lead to, with at most `most` pieces, none of them too
+    short."""
+    while len(fit.free) > most:
+        fit = _fewer(fit, range(len(fit.free)))
+    while True:
+        fit = refined(_climbed(fit, most), POLISH, 1e-4)
+        if len(fit.free) == 1 or not len(_short(fit)):
+            return fit
+        firm = refined(replace(fit, data=replace(fit.data, slack=FIRM)), POLISH, 1e-2)
+        if not len(_short(firm)):
+            return firm
+        fit = _fewer(fit, _short(fit))
+        most = len(fit.free)
+
+
+def _short(fit):
+    """Indices of pieces that are too short to be built."""
+    return np.flatnonzero(fit.lengths < fit.data.shortest - SHORT)
+
+
+def _fewer(fit, pieces):
+    """With one piece less, at the least loss; one of `pieces` goes or is merged."""
+    framed, based = fit.data.frames is not None, fit.data.base is not None
+    options = [
+        (move, free)
+        for move, free in (*_merged(fit), *_without(fit))
+        if move.piece in pieces or (move.name == "merge" and move.piece + 1 in pieces)
+    ]
+    good = [move for move, free in options if allowed(free, framed, based)] or [move for move, _ in options]
+    good = sorted(good, key=lambda m: -m.gain)[:TRIES]
+    return min((untwisted(refined(move.made())) for move in good), key=lambda f: f.criterion)
+
+
+def _climbed(fit, most):
+    """As far as single moves lead."""
     for _ in range(ROUNDS):
         options = [m for m in moves(fit, most) if m.gain > HOPE]
         for move in sorted(options, key=lambda m: -m.gain)[:TRIES]:
@@ -54,7 +90,7 @@ def searched(fit: Fit, most: int) -> Fit:
                 break
         else:
             break
-    return refined(fit, POLISH, 1e-4)
+    return fit
 
 
 def untwisted(fit: Fit) -> Fit:
@@ -207,7 +243,7 @@ def _merged(fit):
 
             return _changed(fit, step, free, edit)
 
-        yield Move("merge", price - cost, made), free
+        yield Move("merge", price - cost, made, i), free
 
 
 def _without(fit):
@@ -229,7 +265,7 @@ def _without(fit):
             return _changed(fit, np.zeros(len(fit.columns)), free, edit)
 
         short = fit.lengths[i] < 2 * fit.data.shortest
-        yield Move("omit", HOPE + 1.0 if short else HOPE - 1.0, made), free
+        yield Move("omit", HOPE + 1.0 if short else HOPE - 1.0, made, i), free
 
 
 def _shifted(fit):

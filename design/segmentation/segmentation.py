@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneunet.base.curve import Curve
-from pneunet.design.target.target import Piece
+from pneunet.base.units import PER_MM_PER_M
+from pneunet.design.target.target import BENDING, HELICAL, Piece
+from pneunet.geometry.parameters import TWISTING
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +42,23 @@ class Segmentation:
         """(n - 1,) arc lengths at which one piece ends and the next begins, mm."""
         return np.cumsum([piece.length for piece in self.pieces])[:-1]
 
+    def toml(self) -> str:
+        """The pieces as [[piece]] tables of a target's file, to be edited and given back."""
+        return "\n".join(_table(piece) for piece in self.pieces)
+
     def __repr__(self) -> str:
         told = ", ".join(f"{p.kind}{' (rolled)' * bool(p.roll)} {p.length:.1f} mm" for p in self.pieces)
         return f"<Segmentation: {told}; rms {self.rms:.3f} mm, noise {self.noise:.3f} mm>"
+
+
+def _table(piece):
+    rows = {"kind": f'"{piece.kind}"', "length_mm": f"{piece.length:.3f}"}
+    curved, turned = piece.kind in (BENDING, HELICAL), piece.kind in (TWISTING, HELICAL)
+    if curved and piece.roll:
+        rows["roll_deg"] = f"{piece.roll:g}"
+    if curved and piece.curvature:
+        rows["curvature_per_m"] = f"{piece.curvature / PER_MM_PER_M:.4f}"
+    if turned and piece.twist is not None:
+        key, unit = ("tau_rad_per_mm", 1.0) if piece.kind == TWISTING else ("torsion_rad_per_m", PER_MM_PER_M)
+        rows[key] = f"{piece.twist / unit:.7g}"
+    return "[[piece]]\n" + "".join(f"{key} = {value}\n" for key, value in rows.items())

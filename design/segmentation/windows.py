@@ -16,6 +16,7 @@ CELL = 8.0  # mm
 MOST_CELLS = 64
 FIRST_STEPS, STEPS = 5, 2  # of Gauss and Newton: of the first stretches, of grown ones
 SMOOTH = 10.0  # mm to either side that the first arc lengths are smoothed over
+LEAST_POINTS = 3  # of a stretch
 HOPELESS = 80.0  # by which a stretch's squares may exceed what noise explains, in units of its variance
 
 
@@ -26,9 +27,14 @@ def arc_lengths(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     growth of squared distances with the index instead.
     """
     n = len(points)
-    stride = max(1, min(8, n // 12))
-    near, far = (np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride))
-    spacing = np.sqrt(max(far - near, 1e-3 * far) / 3) / stride
+    spacing = 0.0
+    for stride in (1, 2, 4, 8):
+        if 2 * stride < n:
+            near, far = (
+                np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride)
+            )
+            # where the curve turns within a stride it seems too small
+            spacing = max(spacing, np.sqrt(max(far - near, 1e-3 * far) / 3) / stride)
     half = min(int(SMOOTH / spacing), (n - 1) // 2)
     if half < 2:
         smooth = points
@@ -85,19 +91,19 @@ class Stretches:
         active = np.arange(count)
         for cells in range(least, count + 1):
             active = active[active + cells <= count]
-            active = active[self.index[active + cells] - self.index[active] >= 3]
+            some = self.index[active + cells] - self.index[active] >= LEAST_POINTS
+            fitted = active[some]
+            if not len(fitted):
+                continue
+            self._fit(fitted, cells, STEPS if self.found else FIRST_STEPS)
             if cells == least:
-                self._fit(active, cells, FIRST_STEPS)
                 self._estimate_noise(floor)
                 # once more, now that it is known how much of the torsion is noise
                 self.strains[:, 0] = 0.0
-                self._fit(active, cells, FIRST_STEPS)
-            elif len(active):
-                self._fit(active, cells, STEPS)
-            fits = [self.found[a, a + cells] for a in active]
+                self._fit(fitted, cells, FIRST_STEPS)
+            fits = [self.found[a, a + cells] for a in fitted]
             hopeful = [f.square < self.noise**2 * (f.left + HOPELESS) for f in fits]
-            if cells > least:
-                active = active[np.array(hopeful, bool)]
+            active = np.sort(np.concatenate([active[~some], fitted[np.array(hopeful, bool)]]))
 
     def _start(self, s, least):
         """First poses, at the middles of the first stretches, and strains from quadratics."""
