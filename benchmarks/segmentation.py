@@ -40,7 +40,7 @@ def _told(truth) -> bool:
 
 
 def _distances(target, fit):
-    """(how far each joint is from the true one in arc length of the true curve, RMS distance of the curves)."""
+    """(how far each joint is from the true one along the true curve, RMS distance of the curves), mm."""
     length = target.lengths.sum()
     s = np.arange(0, length, SAMPLES)
     exact = target.exact(s)

@@ -1,4 +1,4 @@
-"""A rod against points: misfit across the tangent, its slopes, Levenberg and Marquardt's steps, the criterion.
+"""A rod against points: misfit across the tangent, slopes, Levenberg and Marquardt's steps, the criterion.
 
 Every point has a foot on the rod. The feet slide along the tangent with each trial (variable projection), so
 that the misfit is the part of point minus foot across the tangent. Section frames, where given, count by what
@@ -35,10 +35,14 @@ KINDS = {
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and, where given, frames (n, 3, 3)
-    and the section frame base (3, 3) at the first point; weights (n,), 1 on average. lever: mm at which their turns are measured.
-    shortest: length of a piece, mm, which slack lets it miss. reach: {kind: (largest
-    |k1|, largest |k2|)} in 1/mm; a kind that is not named has no limits."""
+    """What a rod is fitted to: points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and,
+    where given, frames (n, 3, 3), the section frame base (3, 3) at the first point, weights (n,), 1 on
+    average.
+
+    length: of the curve, mm. lever: mm at which turns of frames are measured. shortest: length of a piece,
+    mm, which slack lets it miss. reach: {kind: (largest |k1|, largest |k2|)} in 1/mm; a kind that is not
+    named has no limits.
+    """
 
     points: np.ndarray
     noise: float
@@ -96,6 +100,7 @@ class Fit:
     def _roots(self):
         """(m, 3 or 6) of the points' weights; what is along the tangent has none."""
         columns = 3 if self.data.frames is None else 6
+        assert self.data.weights is not None
         roots = np.repeat(np.sqrt(self.data.weights)[:, None], columns, axis=1)
         roots[:, 0] = 1.0
         return roots
@@ -141,8 +146,8 @@ class Fit:
 
     @cached_property
     def bounds(self) -> tuple[float, np.ndarray, np.ndarray]:
-        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of pieces that
-        are too short."""
+        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of pieces
+        that are too short."""
         data, n = self.data, len(self.free)
         size, fixed = 5 + 3 * n, 5 + n
         gradient, curvature = np.zeros(size), np.zeros((size, size))

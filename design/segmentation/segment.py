@@ -10,8 +10,9 @@ from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.design.segmentation import words
 from pneunet.design.segmentation.fit import Fit, Observations, refined
+from pneunet.design.segmentation.moves import allowed
 from pneunet.design.segmentation.rod import Rod
-from pneunet.design.segmentation.search import POLISH, allowed, searched
+from pneunet.design.segmentation.search import POLISH, searched
 from pneunet.design.segmentation.segmentation import Segmentation
 from pneunet.design.segmentation.start import first_rods
 from pneunet.design.segmentation.windows import Stretches, arc_lengths
@@ -40,8 +41,8 @@ def segment(
 ) -> Segmentation:
     """The `Segmentation` of a target's points, and of its section frames and fixed base where it has them.
 
-    options: by default the target's own. Pieces that the target has keep their kinds and order and are refined
-    from where they are. reach: {kind of piece: (largest |twist|, largest curvature)} in 1/mm
+    options: by default the target's own. Pieces that the target has keep their kinds and order and are
+    refined from where they are. reach: {kind of piece: (largest |twist|, largest curvature)} in 1/mm
     of what can be built; a kind that is not named has no limits. Deterministic; some 0.05 s for 150 points.
     """
     options = options or target.split

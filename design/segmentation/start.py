@@ -96,7 +96,7 @@ def first_rods(data: Observations, stretches: Stretches, loose: tuple[float, ...
         seen.add(tuple(np.round(joints, 6)))
         # the longest stretch's frame is where it was found; that of a straight one may have any roll
         anchor = max(range(len(parts)), key=lambda i: (parts[i].wanted[1], parts[i].high - parts[i].low))
-        stretch, part = chosen[anchor][0], parts[anchor]
+        stretch = chosen[anchor][0]
         rod = Rod(np.eye(4), np.array(joints), np.array(strains))
         station = rod.at(np.array([stretch.s]))
         turn = stretch.pose[:3, :3]

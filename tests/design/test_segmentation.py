@@ -86,7 +86,7 @@ def observed(rod, length, noise=0.0, count=150, seed=0, frames=False):
 
 @pytest.mark.parametrize("frames", [False, True])
 def test_gradient_agrees_with_differences(frames):
-    """Of half the cost by every parameter, the feet sliding along: points, weights, frames and a fixed base."""
+    """Of half the cost by every parameter, the feet sliding along: points, weights, frames, a fixed base."""
     random = np.random.default_rng(1)
     points, seen = observed(ROD, 150.0, noise=0.5, frames=frames)
     base = ROD.start[:3, :3] @ se3.exp_rotation(np.array([0.02, 0.01, -0.03]))
