@@ -124,6 +124,12 @@ class Design:
         return self._predicted(self.content.pressure)
 
     @cached_property
+    def further_predictions(self) -> tuple[Centreline, ...]:
+        """The Centrelines at the pressures of the target's further shapes, in their order."""
+        shapes = () if self.target is None else self.target.shapes
+        return tuple(self._predicted(s.pressures if len(s.pressures) > 1 else s.pressures[0]) for s in shapes)
+
+    @cached_property
     def errors(self) -> Errors | None:
         """How far the prediction is from the target; None without one."""
         return None if self.target is None else compare(self.prediction.points, self.target.curve)

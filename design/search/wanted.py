@@ -4,10 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pneunet.base.curve import Curve
 from pneunet.design.search.space import RANGES, prototype
 from pneunet.design.segmentation.segment import segment
 from pneunet.design.segmentation.segmentation import Segmentation
 from pneunet.design.target.extraction import Extracted, extract
+from pneunet.design.target.points import STRIDE, strides
 from pneunet.design.target.reach import ANGLES, reach
 from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Target
 from pneunet.geometry.parameters import TWISTING
@@ -15,6 +17,8 @@ from pneunet.reduced.rod.laws import SegmentLaw
 
 GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"
 REFINED_NOTE = "split given by the user, refined"
+#: of the length, by which a curve may leave its pieces unless the user says: bare ends of segments do so
+TOLERANCE = 1e-3
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
 FAITHFUL = 2e-3
 
@@ -34,7 +38,10 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
     """The Wanted of a Target: its own pieces, or those that it is split into."""
     if target.pieces and not target.split.refine:
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
-    split = segment(target, reach=reachable(target, law))
+    options = target.split
+    if options.tolerance is None:
+        options = replace(options, tolerance=TOLERANCE * _chords(target))
+    split = segment(target, options=options, reach=reachable(target, law))
     followed, notes = target, split.notes
     if abs(target.length - split.length) > FAITHFUL * split.length:
         followed = _on_curve(target, split.curve)
@@ -63,6 +70,11 @@ def reachable(target: Target, law: SegmentLaw) -> dict[str, tuple[float, float]]
             out[BENDING] = 0.0, float(np.nan_to_num(found.curvature[across, 0]))
             out[HELICAL] = twist, float(np.nanmax(found.curvature, initial=0.0))
     return out
+
+
+def _chords(target):
+    """Length (mm) that noise does not lengthen."""
+    return Curve(target.points[strides(target.points, STRIDE)]).length
 
 
 def _half(kind):

@@ -9,6 +9,7 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.design.segmentation import words
+from pneunet.design.segmentation.ends import ends
 from pneunet.design.segmentation.fit import Fit, Observations, refined
 from pneunet.design.segmentation.moves import allowed
 from pneunet.design.segmentation.rod import Rod
@@ -160,7 +161,7 @@ def _told(fit, noise, target, options):
     data = fit.data
     free_base = data.frames is None and data.base is None
     strains = fit.rod.strains.copy()
-    first, last = float(fit.feet[0]), float(fit.feet[-1])
+    first, last = ends(fit.feet, noise)
     station = fit.rod.at(np.array([first]))
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = station.frames[0], station.points[0]
