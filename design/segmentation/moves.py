@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pneunet.design.segmentation.fit import STRAIN, Fit, capped
-from pneunet.design.segmentation.rod import Rod
+from pneunet.design.segmentation.fit import STRAIN, RodFit, capped
+from pneunet.design.segmentation.rod import PiecewiseRod
 
 HOPE = -8.0  # predicted gain below which a move is not tried
 CUT = 5.0  # mm between the places at which a piece may be cut
@@ -24,7 +24,7 @@ class Move:
 
     name: str
     gain: float
-    made: Callable[[], Fit]
+    made: Callable[[], RodFit]
     piece: int = 0
 
 
@@ -40,7 +40,7 @@ def allowed(free: np.ndarray, framed: bool, based: bool) -> bool:
     return not any(straight[i] and free[i, 0] for i in ends)
 
 
-def moves(fit: Fit, most: int) -> Iterator[Move]:
+def moves(fit: RodFit, most: int) -> Iterator[Move]:
     """All `Move`s from a refined fit that leave what the points can tell."""
     data = fit.data
     framed, based = data.frames is not None, data.base is not None
@@ -76,7 +76,7 @@ def _changed(fit, step, free=None, edit=None):
     joints = np.clip(joints, low, high)
     for i in range(1, len(joints)):
         joints[i] = max(joints[i], joints[i - 1] + 1.5 * least)
-    return Fit(fit.data, Rod(moved.rod.start, joints, strains), free, moved.feet)
+    return RodFit(fit.data, PiecewiseRod(moved.rod.start, joints, strains), free, moved.feet)
 
 
 def _conditional(fit, rows, values):
@@ -149,7 +149,7 @@ def _joint_price(fit, i):
     return fit.data.joint_price - np.log(variance)
 
 
-def merged(fit: Fit) -> Iterator[tuple[Move, np.ndarray]]:
+def merged(fit: RodFit) -> Iterator[tuple[Move, np.ndarray]]:
     """Two neighbouring pieces become one; with each move the free strains (n, 2) that it leaves."""
     for i in range(len(fit.free) - 1):
         union = fit.free[i] | fit.free[i + 1]
@@ -182,7 +182,7 @@ def merged(fit: Fit) -> Iterator[tuple[Move, np.ndarray]]:
         yield Move("merge", price - cost, made, i), free
 
 
-def without(fit: Fit) -> Iterator[tuple[Move, np.ndarray]]:
+def without(fit: RodFit) -> Iterator[tuple[Move, np.ndarray]]:
     """A piece goes and its neighbours meet in its middle; one at an end is taken over by its neighbour. With
     each move the free strains (n, 2) that it leaves."""
     n = len(fit.free)

@@ -76,7 +76,7 @@ class Station:
 
 
 @dataclass(frozen=True, eq=False)
-class Rod:
+class PiecewiseRod:
     """start (4, 4): the section frame at s = 0; joints (n - 1,): increasing arc lengths, mm; strains (n, 2):
     (k1, k2) of the pieces, 1/mm."""
 
@@ -153,12 +153,12 @@ class Rod:
             turned[rows, :, column] = station.rotations[:, :, a]
         return moved, turned
 
-    def cut(self, places: np.ndarray) -> "Rod":
+    def cut(self, places: np.ndarray) -> "PiecewiseRod":
         """The same rod with further joints at `places` (m,), increasing, at which nothing changes."""
         joints = np.concatenate([self.joints, places])
         order = np.argsort(joints, kind="stable")
         middles = np.concatenate([[joints[order][0] - 1.0], joints[order]]) if len(joints) else np.zeros(1)
-        return Rod(
+        return PiecewiseRod(
             self.start,
             joints[order],
             self.strains[np.searchsorted(self.joints, middles, side="right")],

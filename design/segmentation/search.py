@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pneunet.design.segmentation.fit import FIRM, Fit, refined
+from pneunet.design.segmentation.fit import FIRM, RodFit, refined
 from pneunet.design.segmentation.moves import HOPE, allowed, merged, moves, without
-from pneunet.design.segmentation.rod import Rod
+from pneunet.design.segmentation.rod import PiecewiseRod
 
 TRIES = 20  # moves tried before a rod is taken for the best
 BETTER = 0.02  # of the criterion: a smaller gain is none
@@ -15,7 +15,7 @@ SHORT = 0.5  # mm by which a piece may be too short
 POLISH = 60  # steps of the last refinement
 
 
-def searched(fit: Fit, most: int) -> Fit:
+def searched(fit: RodFit, most: int) -> RodFit:
     """The best rod that moves from a refined one lead to, with at most `most` pieces, none of them too
     short."""
     while len(fit.free) > most:
@@ -63,7 +63,7 @@ def _climbed(fit, most):
     return fit
 
 
-def untwisted(fit: Fit) -> Fit:
+def untwisted(fit: RodFit) -> RodFit:
     """The same curve with the twists of its twisting pieces within a quarter turn: half a turn more bends all
     that follows to the other side, which a rolled piece does without it. With frames it would show."""
     if fit.data.frames is not None:
@@ -75,4 +75,4 @@ def untwisted(fit: Fit) -> Fit:
         strains[i + 1 :, 1] *= (-1) ** half_turns
     if (strains == fit.rod.strains).all():
         return fit
-    return Fit(fit.data, Rod(fit.rod.start, fit.rod.joints, strains), fit.free, fit.feet)
+    return RodFit(fit.data, PiecewiseRod(fit.rod.start, fit.rod.joints, strains), fit.free, fit.feet)

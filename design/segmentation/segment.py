@@ -10,9 +10,9 @@ from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.design.segmentation import words
 from pneunet.design.segmentation.ends import ends
-from pneunet.design.segmentation.fit import Fit, Observations, refined
+from pneunet.design.segmentation.fit import Observations, RodFit, refined
 from pneunet.design.segmentation.moves import allowed
-from pneunet.design.segmentation.rod import Rod
+from pneunet.design.segmentation.rod import PiecewiseRod
 from pneunet.design.segmentation.search import POLISH, searched
 from pneunet.design.segmentation.segmentation import Segmentation
 from pneunet.design.segmentation.start import first_rods
@@ -54,8 +54,8 @@ def fitted(
     target: Target,
     options: SplitOptions | None = None,
     reach: Mapping[str, tuple[float, float]] | None = None,
-) -> tuple[Fit, float]:
-    """The `Fit` behind it, before conventions and words, and the noise of what it was fitted to, mm."""
+) -> tuple[RodFit, float]:
+    """The `RodFit` behind it, before conventions and words, and the noise of what it was fitted to, mm."""
     options = options or target.split
     points, frames, weights = _thinned(target)
     if len(points) < len(target.points):
@@ -96,14 +96,14 @@ def fitted(
 
 
 def _given(target, data, s):
-    """The `Fit` of the target's own pieces where the best rigid motion puts them."""
+    """The `RodFit` of the target's own pieces where the best rigid motion puts them."""
     pieces = extract(target, target.pieces)
     strains = np.array([[p.twist, -p.curvature if p.roll == 180 else p.curvature] for p in pieces])
     free = np.array([[p.kind in (TWISTING, HELICAL), p.kind in (BENDING, HELICAL)] for p in pieces])
     ends = np.cumsum([p.length for p in pieces])
-    rod = Rod(np.eye(4), ends[:-1] * s[-1] / ends[-1], strains * free)
+    rod = PiecewiseRod(np.eye(4), ends[:-1] * s[-1] / ends[-1], strains * free)
     start = best_rigid_fit(rod.at(s).points, data.points, np.ones(len(s)))
-    return Fit(data, replace(rod, start=start), free, s)
+    return RodFit(data, replace(rod, start=start), free, s)
 
 
 def _noise(fit, floor):
@@ -119,7 +119,7 @@ def _noise(fit, floor):
     return noise, lever
 
 
-def found(data: Observations, stretches: Stretches, most: int) -> Fit:
+def found(data: Observations, stretches: Stretches, most: int) -> RodFit:
     """The best rod of at most `most` pieces from all starts."""
     best = None
     for price in PRICES:

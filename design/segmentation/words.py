@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pneunet.base.units import PER_MM_PER_M
-from pneunet.design.segmentation.fit import Fit, refined
+from pneunet.design.segmentation.fit import RodFit, refined
 from pneunet.design.target.target import PASSIVE, Piece, SplitOptions, Target
 from pneunet.geometry.parameters import TWISTING
 
@@ -19,7 +19,7 @@ def thinned(points: int) -> str:
     return f"{points} points are more than the split needs: means of neighbouring ones are used"
 
 
-def told(fit: Fit, pieces: Sequence[Piece], target: Target, options: SplitOptions) -> Iterator[str]:
+def told(fit: RodFit, pieces: Sequence[Piece], target: Target, options: SplitOptions) -> Iterator[str]:
     """The notes of a final fit."""
     data, last = fit.data, len(pieces) - 1
     framed = data.frames is not None
