@@ -64,7 +64,7 @@ def _distances(target, fit):
 
 
 def segmentation(count: int | None = None, noise: float = NOISE, seed: int | None = None):
-    """Figures of the part, with the targets that went wrong as details."""
+    """Figures of the part, with the targets that went wrong as details; other arguments for studies."""
     from pneunet.design.segmentation.segment import fitted
     from pneunet.design.target.target import Target
 
