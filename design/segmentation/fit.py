@@ -1,4 +1,4 @@
-"""A rod against points: misfit across the tangent, its slopes, Levenberg and Marquardt's steps, the criterion.
+"""A rod against points: misfit across the tangent, slopes, Levenberg and Marquardt's steps, the criterion.
 
 Every point has a foot on the rod. The feet slide along the tangent with each trial (variable projection), so
 that the misfit is the part of point minus foot across the tangent. Section frames, where given, count by what
@@ -13,7 +13,7 @@ from math import lgamma
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.design.segmentation.rod import Rod, Station
+from pneunet.design.segmentation.rod import PiecewiseRod, Station
 from pneunet.design.target.target import BENDING, HELICAL, PASSIVE
 from pneunet.geometry.parameters import TWISTING
 
@@ -35,10 +35,14 @@ KINDS = {
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and, where given, frames (n, 3, 3)
-    and the section frame base (3, 3) at the first point; weights (n,), 1 on average. lever: mm at which their turns are measured.
-    shortest: length of a piece, mm, which slack lets it miss. reach: {kind: (largest
-    |k1|, largest |k2|)} in 1/mm; a kind that is not named has no limits."""
+    """What a rod is fitted to: points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and,
+    where given, frames (n, 3, 3), the section frame base (3, 3) at the first point, weights (n,), 1 on
+    average.
+
+    length: of the curve, mm. lever: mm at which turns of frames are measured. shortest: length of a piece,
+    mm, which slack lets it miss. reach: {kind: (largest |k1|, largest |k2|)} in 1/mm; a kind that is not
+    named has no limits.
+    """
 
     points: np.ndarray
     noise: float
@@ -64,11 +68,11 @@ class Observations:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RodFit:
     """A rod with free strains (n, 2) and the feet's arc lengths (m,) of the points that it is fitted to."""
 
     data: Observations
-    rod: Rod
+    rod: PiecewiseRod
     free: np.ndarray
     feet: np.ndarray
 
@@ -96,6 +100,7 @@ class Fit:
     def _roots(self):
         """(m, 3 or 6) of the points' weights; what is along the tangent has none."""
         columns = 3 if self.data.frames is None else 6
+        assert self.data.weights is not None
         roots = np.repeat(np.sqrt(self.data.weights)[:, None], columns, axis=1)
         roots[:, 0] = 1.0
         return roots
@@ -135,14 +140,14 @@ class Fit:
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Indices of the parameters that are free, among all of `Rod.slopes`."""
+        """Indices of the parameters that are free, among all of `PiecewiseRod.slopes`."""
         fixed = 5 + len(self.free)
         return np.concatenate([np.arange(fixed), fixed + np.flatnonzero(self.free)])
 
     @cached_property
     def bounds(self) -> tuple[float, np.ndarray, np.ndarray]:
-        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of pieces that
-        are too short."""
+        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of pieces
+        that are too short."""
         data, n = self.data, len(self.free)
         size, fixed = 5 + 3 * n, 5 + n
         gradient, curvature = np.zeros(size), np.zeros((size, size))
@@ -209,7 +214,7 @@ class Fit:
         """(m, 1 + 2 or 5, p) of the feet along the tangent, then of what is fitted, by all parameters."""
         return self.slopes_of(self.rod, self.station)
 
-    def slopes_of(self, rod: Rod, station: Station) -> np.ndarray:
+    def slopes_of(self, rod: PiecewiseRod, station: Station) -> np.ndarray:
         """The same for a rod that is this one but for cuts."""
         moved, turned = rod.slopes(station)
         if self.data.frames is not None:
@@ -267,7 +272,7 @@ class Fit:
         places = joints * self.data.joint_price - 2 * lgamma(joints + 1)
         return float(self.cost + size + strains + places)
 
-    def stepped(self, step: np.ndarray) -> "Fit":
+    def stepped(self, step: np.ndarray) -> "RodFit":
         """With the free parameters changed by `step` (q,) and the feet moved along."""
         n = len(self.free)
         full = np.zeros(5 + 3 * n)
@@ -276,20 +281,20 @@ class Fit:
         start[:3, :3] = se3.exp_rotation(full[:3]) @ start[:3, :3]
         start[:3, 3] += full[3:6]
         strains = np.clip(self.rod.strains + full[5 + n :].reshape(n, 2), -self.most, self.most)
-        rod = Rod(start, self.rod.joints + full[6 : 5 + n], strains)
+        rod = PiecewiseRod(start, self.rod.joints + full[6 : 5 + n], strains)
         slide = self.away[:, 0] - self.slopes[:, 0, self.columns] @ step
-        return Fit(self.data, rod, self.free, self.feet + slide)
+        return RodFit(self.data, rod, self.free, self.feet + slide)
 
-    def within_reach(self) -> "Fit":
+    def within_reach(self) -> "RodFit":
         """With strains that can be reached."""
         if not self.data.reach:
             return self
         strains = np.clip(self.rod.strains, -self.most, self.most)
-        return Fit(self.data, Rod(self.rod.start, self.rod.joints, strains), self.free, self.feet)
+        return RodFit(self.data, PiecewiseRod(self.rod.start, self.rod.joints, strains), self.free, self.feet)
 
-    def settled(self) -> "Fit":
+    def settled(self) -> "RodFit":
         """With the feet slid to where they belong."""
-        return Fit(self.data, self.rod, self.free, self.feet + self.away[:, 0])
+        return RodFit(self.data, self.rod, self.free, self.feet + self.away[:, 0])
 
 
 def capped(step: np.ndarray, joints: int) -> np.ndarray:
@@ -303,7 +308,7 @@ def capped(step: np.ndarray, joints: int) -> np.ndarray:
     return step / max(1.0, *sizes)
 
 
-def refined(fit: Fit, steps: int = 30, enough: float = 0.02) -> Fit:
+def refined(fit: RodFit, steps: int = 30, enough: float = 0.02) -> RodFit:
     """The local optimum, by Levenberg and Marquardt's steps until one gains less than `enough`."""
     damping = 1e-3
     fit = fit.within_reach()

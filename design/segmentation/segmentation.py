@@ -14,12 +14,12 @@ from pneunet.geometry.parameters import TWISTING
 class Segmentation:
     """pieces: n of them, base to tip, in a section frame that is continuous along the rod.
 
-    base_pose (4, 4): that frame at the curve's start, in target coordinates. strains (n, 3): its rates (k1, k2,
-    k3) per deformed length, 1/mm; k2 < 0 is a piece rolled by 180 degrees. standard_errors (n, 3): theirs, 0
-    where a rate is fixed. noise: estimated standard deviation of a coordinate of a point, mm. rms: between
-    the points and the rod, across it, mm. criterion: what the split was chosen by, smaller is better. curve:
-    the fitted rod's centreline; its length is the target's, which noise does not lengthen. notes: what was not
-    identifiable, which convention was taken, what was given up.
+    base_pose (4, 4): that frame at the curve's start, in target coordinates. strains (n, 3): its rates (k1,
+    k2, k3) per deformed length, 1/mm; k2 < 0 is a piece rolled by 180 degrees. standard_errors (n, 3):
+    theirs, 0 where a rate is fixed. noise: estimated standard deviation of a coordinate of a point, mm. rms:
+    between the points and the rod, across it, mm. criterion: what the split was chosen by, smaller is better.
+    curve: the fitted rod's centreline; its length is the target's, which noise does not lengthen. notes: what
+    was not identifiable, which convention was taken, what was given up.
     """
 
     pieces: tuple[Piece, ...]

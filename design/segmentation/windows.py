@@ -67,8 +67,11 @@ class Stretch:
 
 
 class Stretches:
-    """All `Stretch`es of points (n, 3) at first arc lengths s (n,); noise: standard deviation, mm, or None for
-    what the shortest stretches say, at least `floor`."""
+    """All `Stretch`es, `found`, of points (n, 3) at first arc lengths s (n,), mm.
+
+    floor: least noise, mm. shortest: length of the first stretches, mm. noise: what these say, at least the
+    floor; estimate: without it.
+    """
 
     def __init__(
         self,
@@ -128,12 +131,11 @@ class Stretches:
             up = -down / np.linalg.norm(down)
             self.turn[a] = np.column_stack([tangent, np.cross(up, tangent), up])
             if self.frames is not None:
-                self._from_frames(a, s, i, j)
+                self._from_frames(a, s, self.frames, i, j)
 
-    def _from_frames(self, a, s, i, j):
-        middle = (i + j) // 2
-        self.turn[a] = self.frames[middle]
-        turned = se3.log_rotation(self.frames[i].T @ self.frames[j - 1]) / max(s[j - 1] - s[i], 1e-9)
+    def _from_frames(self, a, s, frames, i, j):
+        self.turn[a] = frames[(i + j) // 2]
+        turned = se3.log_rotation(frames[i].T @ frames[j - 1]) / max(s[j - 1] - s[i], 1e-9)
         self.strains[a] = np.clip(turned[:2], -3 * STRAIN, 3 * STRAIN)
 
     def _fit(self, a, cells, steps):
