@@ -15,6 +15,8 @@ LARGEST_PRESSURE_KPA = 2000.0
 
 #: mm; as people name units of length
 LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4, "inch": 25.4}
+#: kPa; as people name units of pressure, in small letters
+PRESSURES_KPA = {"kpa": 1.0, "pa": 1e-3, "mpa": 1e3, "bar": 100.0, "mbar": 0.1, "psi": 6.894757}
 
 #: unit suffix of a file key -> factor to the consistent system
 TO_INTERNAL = {

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from pneunet.design.inverse_design import inverse_design as inverse_design
     from pneunet.design.report.rundata import Solution as Solution
     from pneunet.design.target.target import Target as Target
+    from pneunet.design.workspace import Workspace as Workspace
+    from pneunet.design.workspace import workspace as workspace
     from pneunet.front import loads as loads
     from pneunet.front import material as material
     from pneunet.front import predict as predict
@@ -60,6 +62,7 @@ _PLACES = {
     "Segment": "geometry.parameters",
     "Solution": "design.report.rundata",
     "Target": "design.target.target",
+    "Workspace": "design.workspace",
     "inverse_design": "design.inverse_design",
     "loads": "front",
     "material": "front",
@@ -72,6 +75,7 @@ _PLACES = {
     "segment": "front",
     "silicone": "base.materials.laws",
     "solve_cell": "design.chain",
+    "workspace": "design.workspace",
 }
 __all__ = [*_PLACES, "__version__"]
 

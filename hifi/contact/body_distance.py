@@ -45,7 +45,7 @@ class BodyDistance:
             float(np.hypot(s.width, s.chamber_top - s.chamber_bottom)) for s in manipulator.segments
         )
         self.apart = max(self.diameter, *(s.pitch for s in manipulator.segments if s.chambers))
-        self._local = surface.facet_nodes(problem, tags.OUTER, tags.TIP, tags.BASE)
+        self._local = surface.wall_triangles(problem, tags.OUTER, tags.TIP, tags.BASE)
         X = gathered(self.comm, problem.nodes[self._local])
         if self.comm.rank == 0:
             self._arrange(X)

@@ -61,7 +61,7 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
     assert np.ptp(z[~on_side], axis=1) == pytest.approx(0.0, abs=1e-9)
     ends = first.chamber_positions[0] - first.pitch / 2, BOTH.length - last.end_wall
     assert (x.min(), x.max()) == pytest.approx(ends)
-    assert set(stored.tetrahedron_tags) == {tags.BODY, tags.BODY + 1}
+    assert set(stored.cell_tags) == {tags.BODY, tags.BODY + 1}
 
 
 def test_each_pressure_group_has_a_closed_cavity_between_bulkheads(tmp_path):
