@@ -69,12 +69,17 @@ class DesignFile(Checked):
         """That of the group with the largest, MPa: what "the pressure" of a body with several means."""
         return float(np.max(self.pressure))
 
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """(groups,) each pressure over the largest; all 1 where all are 0."""
+        each, largest = np.broadcast_to(self.pressure, len(self.manipulator.groups)), self.largest_pressure
+        return tuple((each / largest).tolist()) if largest else (1.0,) * len(each)
+
     def scaled(self, largest: float) -> float | tuple[float, ...]:
-        """The pressures in the same proportions, the largest of them `largest` (MPa); of groups that are all
-        at 0, all the same."""
+        """The pressures in the same proportions, the largest of them `largest` (MPa)."""
         if not isinstance(self.pressure, tuple):
             return largest
-        return tuple(largest * p / self.largest_pressure for p in self.pressure)
+        return tuple(largest * share for share in self.shares)
 
 
 TABLES = ("material", "layer_material", "segment", "base", "result", "loads", "measure")

@@ -30,7 +30,7 @@ def _members(about, names):
         "cells": Member("i", ("cells", of_cell), 0, "points"),
         "cell_tags": Member("i", ("cells",), tags.BODY, tags.GAP + 1),
         "facets": Member("i", ("facets", of_facet), 0, "points"),
-        "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.OUTER + 1),
+        "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.LAST_FACE + 1),
     }
 
 

@@ -283,7 +283,8 @@ def wall_picture(manipulator: Manipulator, solve: Solution, folder: Path) -> lis
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
         ax.set_title(
-            "upper chambers" if side > 0 else "lower chambers (seen through the body)",
+            ("upper chambers" if side > 0 else "lower chambers (seen through the body)")
+            + ", each segment as before its roll" * any(s.roll for s in manipulator.segments),
             fontsize=9,
             loc="left",
             pad=7,

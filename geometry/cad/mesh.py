@@ -68,7 +68,7 @@ def mesh_manipulator(manipulator: Manipulator, mesh_size: float, directory: str 
             "mesh_size_mm": mesh_size,
             "segments": segment_tables(manipulator),
             **volumes,
-            **_check(mesh, volumes),
+            **_check(mesh, volumes, len(manipulator.groups)),
             "seconds": time.perf_counter() - started,
         }
         save(directory / MESH, mesh, facts)
@@ -85,16 +85,19 @@ def segment_tables(manipulator: Manipulator) -> list[dict]:
     return [segment_table(s) for s in manipulator.segments]
 
 
-def _check(mesh, volumes):
-    """Counts, areas and quality of a mesh; InputError when the cavity leaks or volumes disagree."""
+def _check(mesh, volumes, groups):
+    """Counts, areas and quality of a mesh; InputError when a cavity leaks or volumes disagree."""
     areas = {}
-    for tag, name in tags.FACE_NAMES.items():
+    for tag, name in tags.face_names(groups).items():
         xyz = mesh.points[mesh.tagged(tag)]
         areas[f"{name}_mm2"] = float(
             np.linalg.norm(np.cross(xyz[:, 1] - xyz[:, 0], xyz[:, 2] - xyz[:, 0]), axis=1).sum() / 2
         )
-    cavity = np.concatenate([mesh.tagged(tags.CAVITY), mesh.tagged(tags.CHANNEL)])
-    if open_edges(cavity) or open_edges(mesh.facets):
+    cavities = [
+        np.concatenate([mesh.tagged(tag) for tag in tags.cavity_tags(group)])
+        for group in range(1, groups + 1)
+    ]
+    if any(map(open_edges, [*cavities, mesh.facets])):
         raise InputError(
             "mesh: the cavity's or the body's surface is not closed: walls touch or cut each other"
         )

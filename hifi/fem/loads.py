@@ -37,13 +37,13 @@ class Pressure(AppliedLoad):
     """Follower pressure `value` (MPa) on tagged facets: -P V, so P inner(J inv(F).T N, v) in the residual.
 
     closed: the facets close a cavity, so that the load's tangent is symmetric; an open loaded patch has
-    closed = False.
+    closed = False. share: of the body's pressure, which several cavities divide.
     """
 
     has_tangent = True
 
-    def __init__(self, tags: tuple[int, ...], closed: bool = True):
-        self.tags, self.closed = tuple(tags), closed
+    def __init__(self, tags: tuple[int, ...], closed: bool = True, share: float = 1.0):
+        self.tags, self.closed, self.share = tuple(tags), closed, share
 
     def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
         ds, F = field.facets(*self.tags), ufl.Identity(3) + ufl.grad(field.u)
