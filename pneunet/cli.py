@@ -5,6 +5,7 @@ with one line on standard error, under MPI from one rank); anything else is a bu
 """
 
 import errno
+import logging
 import os
 import sys
 from argparse import Namespace
@@ -18,6 +19,8 @@ from pneunet.base.system.launch import rank_map
 from pneunet.base.system.libraries import told_what_to_install
 from pneunet.base.system.log import complain, show_on_screen
 from pneunet.base.units import MPA_PER_KPA
+
+log = logging.getLogger(__name__)
 
 
 def design(a: Namespace) -> None:
@@ -44,6 +47,7 @@ def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
     content = read_design_file(a.design)  # before finite elements are loaded, which takes a while
+    log.info(f"solve: {content.name}; finite elements are loaded")
     from pneunet.hifi.runs.solve.solve import solve_design
 
     pressure = None if a.pressure is None else a.pressure * MPA_PER_KPA
@@ -52,18 +56,21 @@ def solve(a: Namespace) -> None:
 
 
 def cell(a: Namespace) -> None:
+    log.info(f"cell: {a.cell}; finite elements are loaded")
     from pneunet.hifi.runs.cell import run_cell
 
     run_cell(a.cell, a.output or a.cell.parent)
 
 
 def study(a: Namespace) -> None:
+    log.info(f"study: {a.study}; finite elements are loaded")
     from pneunet.hifi.runs.study.study import run_study
 
     run_study(a.study, a.output or Path("out") / a.study.stem, retry=a.retry)
 
 
 def campaign(a: Namespace) -> None:
+    log.info(f"campaign: {a.campaign}; finite elements are loaded")
     from pneunet.hifi.runs.campaign.campaign import run_campaign
 
     run_campaign(a.campaign, a.output or Path("out") / a.campaign.stem, retry=a.retry, extend=a.extend)
