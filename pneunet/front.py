@@ -11,6 +11,7 @@ from pneunet.base.materials.laws import Hyperelastic, material_from_table
 from pneunet.base.units import in_MPa
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.report import write_report
+from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import Manipulator, Segment
@@ -59,9 +60,12 @@ def predict(
     """The Centreline (mm) of a free Manipulator at a pressure; base_pose (4, 4): frame of its base.
 
     law: 'trained', 'analytic', a law's file (.npz) or a SegmentLaw. InputError for a pressure that is none,
-    ConvergenceError where the law has no equilibrium.
+    ConvergenceError where the law has no equilibrium. What makes the law doubt its answer is logged.
     """
-    return prediction.predict(manipulator, in_MPa(pressure_kPa), chosen_law(law), base_pose=base_pose)
+    law, pressure = chosen_law(law), in_MPa(pressure_kPa)
+    line = prediction.predict(manipulator, pressure, law, base_pose=base_pose)
+    tell_doubts(prediction.doubts(manipulator, pressure, law), law, WARN)
+    return line
 
 
 def rod(

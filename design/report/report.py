@@ -185,7 +185,8 @@ def _headline(run, comparison):
     if c.reduced_solved:
         out += (
             '<p class="missing">The bars are conventions of this report: an RMS distance of'
-            f" {POSITION_BAR:g} % of length, a difference of {STRAIN_BAR:g} % of the largest |k| of a segment.</p>"
+            f" {POSITION_BAR:g} % of length, a difference of {STRAIN_BAR:g} % of the largest |k| of a"
+            " segment.</p>"
         )
     return out
 
