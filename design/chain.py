@@ -4,6 +4,7 @@ back.
 This is the one module of design that knows of hifi, and only inside functions.
 """
 
+import logging
 import signal
 import subprocess
 import sys
@@ -25,6 +26,7 @@ from pneunet.geometry.parameters import Segment
 from pneunet.reduced.choice import choose_law
 
 DONE, BAD_INPUT = 0, 2
+log = logging.getLogger(__name__)
 
 
 def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
@@ -138,6 +140,7 @@ def suggest(
         who = campaign_path if kind in known else f"--law {law}"
         raise InputError(f"--kind {kind}: {who} does not know it")
     offered = on_offer(campaign, kind, of)
+    log.info(f"# {number} of {len(offered)} designs are chosen one after the other")
     shape = np.array([shape_numbers(segment) for _, segment in offered])
     top, share = (campaign.table[key] for key in ("top_pressure", "limit_share"))
     rows = most_telling(known[kind], shape, number, top, share, touching)

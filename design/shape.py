@@ -59,6 +59,10 @@ def run_shape(
         pressures_kPa = [design.pressure_kPa * i / STEPS for i in range(1, STEPS + 1)]
     if not len(pressures_kPa):
         raise InputError("--pressure-kPa: give at least one pressure")
+    count = len(design.manipulator.segments)
+    log.info(
+        f"shape: {design.content.name}, {count} segment{'s' * (count > 1)} at {_list(pressures_kPa)} kPa"
+    )
     shapes: dict[float, Centreline] = {}
     failed: dict[float, str] = {}
     for p in sorted(set(pressures_kPa)):
@@ -118,7 +122,7 @@ def _pictures(design, pressures, folder):
     for p, (vertices, quads, segments) in zip(pressures, bodies):
         write_quads(folder / f"body_{plain(p)}kPa.vtp", vertices, quads, {"segment": segments + 1})
     _picture_of_all(design.content.name, pressures, bodies, folder / "bodies.png")
-    log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
+    log.info(f"bodies at every pressure: {folder / 'bodies.png'}; {FRAMES} frames of the inflation follow")
     highest = max(pressures)
     if highest > 0:
         _animation(design, highest, folder / "inflation.gif")

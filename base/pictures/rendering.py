@@ -165,7 +165,7 @@ def show(ax: Any, view: View, image: np.ndarray, overlays: Sequence[Overlay] = (
     ax.imshow(image)
     ax.set_axis_off()
     for points, style in overlays:
-        ax.plot(*view.pixels(points).T, **style, path_effects=[withStroke(linewidth=5, foreground="white")])
+        ax.plot(*view.pixels(points).T, **style, path_effects=[withStroke(linewidth=4.5, foreground="white")])
     _scale_bar(ax, view)
     _triad(ax, view)
 

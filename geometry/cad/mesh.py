@@ -43,6 +43,9 @@ def mesh_manipulator(manipulator: Manipulator, mesh_size: float, directory: str 
     directory = Path(directory)
     started = time.perf_counter()
     refuse_absurd(mesh_size, [(s, s.length, s.chambers) for s in manipulator.segments])
+    log.info(
+        f"mesh: {manipulator.chambers} chambers, {manipulator.length:.0f} mm, elements of {mesh_size:g} mm"
+    )
     with cad.session():
         try:
             volumes = cad.build(manipulator)

@@ -1,5 +1,6 @@
 """One pitch of a segment from rest to a pressure, free or at prescribed strains, with its rod stiffness."""
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +19,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath, LimitPoint
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
 
+log = logging.getLogger(__name__)
 #: iterations that a lagged tangent may still need in contact, where tangents age fast
 CONTACT_PATIENCE = 10.0
 
@@ -39,6 +41,7 @@ def solve_cell(
     edge_size = case.mesh_size * EDGE if case.graded else None
     medium = case.medium if case.contact == "third-medium" else None
     facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=medium is not None, edge_size=edge_size)
+    log.info(f"cell: {facts['cells']} elements; forms that are new to this machine are compiled")
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )
