@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -211,7 +211,7 @@ class Workspace:
     def write(self, directory: Path) -> None:
         """Write reach.csv, tips.npz, run.json and, with matplotlib, workspace.png."""
         write_csv(directory / "reach.csv", REACH, self.rows())
-        arrays = {}
+        arrays: dict[str, np.ndarray] = {}
         for number_, cloud in enumerate(self.clouds, start=1):
             arrays |= {
                 f"tip_mm_{number_}": cloud.tips.astype(np.float32),
@@ -219,9 +219,10 @@ class Workspace:
                 f"angle_deg_{number_}": cloud.angles.astype(np.float32),
                 f"pressure_kPa_{number_}": (KPA_PER_MPA * cloud.pressures).astype(np.float32),
             }
-        about = {"chains": [list(cloud.chain) for cloud in self.clouds], "law": self.law.name}
+        about: dict[str, Any] = {"chains": [list(cloud.chain) for cloud in self.clouds], "law": self.law.name}
         write_archive(directory / "tips.npz", SCHEMA, about, arrays, compress=True)
-        entries = {"shapes": sum(len(c.tips) for c in self.clouds), "without_equilibrium": self.lost}
+        entries: dict[str, Any] = {"shapes": sum(len(c.tips) for c in self.clouds)}
+        entries |= {"without_equilibrium": self.lost}
         write_record(directory, case=self.case.name, **about, **entries, wall_seconds=round(self.seconds, 2))
         try:
             rendering.save(self.plot(), directory / "workspace.png")
