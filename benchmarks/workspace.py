@@ -6,7 +6,8 @@ SHAPES = 100_000
 
 
 def hundred_thousand():
-    """The default case of `pneunet workspace` with SHAPES shapes, the law read before; best of three, CPU s."""
+    """The default case of `pneunet workspace` with SHAPES shapes, the law read before: best of three, CPU
+    s."""
     from pneunet.design.workspace import WorkspaceCase, workspace
     from pneunet.reduced.choice import shipped_law
 
