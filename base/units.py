@@ -1,6 +1,7 @@
 """Consistent units: mm, N, MPa, tonne, s. Files and the command line carry the unit in the key; inside there
 is one system, and these are the factors between the two."""
 
+from collections.abc import Iterable
 from numbers import Real
 
 from pneunet.base.errors import InputError
@@ -40,3 +41,10 @@ def in_MPa(pressure_kPa: float) -> float:
         shown = f"{pressure_kPa:g}" if isinstance(pressure_kPa, Real) else repr(pressure_kPa)
         raise InputError(f"pressure_kPa = {shown} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
     return pressure_kPa * MPA_PER_KPA
+
+
+def each_in_MPa(pressure_kPa: float | Iterable[float]) -> float | tuple[float, ...]:
+    """One pressure in MPa, or one for each group of segments; InputError as for `in_MPa`."""
+    if isinstance(pressure_kPa, Iterable) and not isinstance(pressure_kPa, str):
+        return tuple(in_MPa(p) for p in pressure_kPa)
+    return in_MPa(pressure_kPa)

@@ -16,7 +16,7 @@ from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
-from pneunet.base.units import KPA_PER_MPA, in_MPa
+from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
@@ -25,7 +25,7 @@ from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.overlap import overlap_doubts
-from pneunet.reduced.rod.prediction import doubts, predict
+from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,14 +57,14 @@ class Design:
         cls,
         manipulator: Manipulator,
         *,
-        pressure_kPa: float,
+        pressure_kPa: float | Iterable[float],
         name: str = "design",
         law: str | SegmentLaw = "trained",
         mesh_size_mm: float = 2.0,
     ) -> "Design":
-        """A Manipulator made by hand at a pressure. law: 'trained', 'analytic', a law's file (.npz) or a
-        SegmentLaw. InputError where pressure or mesh size is none."""
-        content = DesignFile(manipulator, in_MPa(pressure_kPa), name=name, mesh_size=mesh_size_mm)
+        """A Manipulator made by hand at a pressure, or at one for each group of its segments. law: 'trained',
+        'analytic', a law's file (.npz) or a SegmentLaw. InputError where pressure or mesh size is none."""
+        content = DesignFile(manipulator, each_in_MPa(pressure_kPa), name=name, mesh_size=mesh_size_mm)
         return cls(content, chosen_law(law))
 
     @classmethod
@@ -105,8 +105,8 @@ class Design:
 
     @property
     def pressure_kPa(self) -> float:
-        """The design's pressure."""
-        return self.content.pressure * KPA_PER_MPA
+        """The design's pressure, of several groups of segments the largest."""
+        return self.content.largest_pressure * KPA_PER_MPA
 
     @cached_property
     def prediction(self) -> Centreline:
@@ -121,28 +121,36 @@ class Design:
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """Reasons, one a line, not to trust the prediction at the design's pressure."""
-        of_the_law = doubts(self.manipulator, self.content.pressure, self.law)
+        of_the_law = doubts(self.manipulator, [self.content.pressure], self.law)
         return of_the_law + overlap_doubts(self.manipulator, self.prediction)
 
     @cached_property
     def strains(self) -> RodStrains:
-        """RodStrains (segments, 3) of the segments' active parts at the design's pressure."""
-        return self.law.each(self.manipulator.segments, self.content.pressure)
+        """RodStrains (segments, 3) of the segments' active parts at the design's pressure, in the body's
+        axes."""
+        return segment_strains(self.manipulator, self.content.pressure, self.law)
 
     @overload
     def predict(self, pressures_kPa: float) -> Centreline: ...
 
     @overload
-    def predict(self, pressures_kPa: Iterable[float]) -> list[Centreline]: ...
+    def predict(self, pressures_kPa: Iterable[float | Iterable[float]]) -> list[Centreline]: ...
 
-    def predict(self, pressures_kPa: float | Iterable[float]) -> Centreline | list[Centreline]:
+    def predict(
+        self, pressures_kPa: float | Iterable[float | Iterable[float]]
+    ) -> Centreline | list[Centreline]:
         """The Centreline at a pressure, or a list of them at several, in the target's coordinates.
 
-        InputError for a pressure that is none, ConvergenceError where the law has no equilibrium.
+        Of a body with several groups of segments a number is the largest pressure, the others in the design's
+        proportions; in a list there may be tuples of one for each group. InputError for a pressure that is
+        none, ConvergenceError where the law has no equilibrium.
         """
-        if isinstance(pressures_kPa, Iterable):
-            return [self.predict(p) for p in pressures_kPa]
-        return self._predicted(in_MPa(pressures_kPa))
+        if not isinstance(pressures_kPa, Iterable):
+            return self._predicted(self.content.scaled(in_MPa(pressures_kPa)))
+        return [
+            self._predicted(each_in_MPa(p)) if isinstance(p, Iterable) else self.predict(p)
+            for p in pressures_kPa
+        ]
 
     def _predicted(self, pressure):
         return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)

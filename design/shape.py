@@ -60,7 +60,9 @@ def run_shape(
             failed[p] = str(error)
     if not shapes:
         raise ConvergenceError(f"no shape at {_list(failed)} kPa: {next(iter(failed.values()))}")
-    doubted = doubts(design.manipulator, [in_MPa(p) for p in pressures_kPa], design.law)
+    doubted = doubts(
+        design.manipulator, [design.content.scaled(in_MPa(p)) for p in pressures_kPa], design.law
+    )
     overlaps = ((p, text) for p, line in shapes.items() for text in overlap_doubts(design.manipulator, line))
     doubted += tuple(f"from {plain(p)} kPa on {text}" for p, text in islice(overlaps, 1))
     tell_doubts(doubted, design.law, outside)
@@ -123,7 +125,9 @@ def _bodies(design, pressures):
     from pneunet.design.report.bodies import body_mesh
 
     pose = design.content.base_pose
-    bodies = [body_mesh(design.manipulator, in_MPa(p), design.law, pose) for p in pressures]
+    bodies = [
+        body_mesh(design.manipulator, design.content.scaled(in_MPa(p)), design.law, pose) for p in pressures
+    ]
     return bodies, view_of(np.vstack([body.points for body in bodies]))
 
 

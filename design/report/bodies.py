@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base import se3
 from pneunet.base.errors import InputError
@@ -32,7 +33,7 @@ def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple
 
 
 def body_mesh(
-    manipulator: Manipulator, pressure: float, law: SegmentLaw, base_pose: np.ndarray | None
+    manipulator: Manipulator, pressure: ArrayLike, law: SegmentLaw, base_pose: np.ndarray | None
 ) -> "PolyData":
     """The reduced model's body (pyvista.PolyData, mm, target coordinates), cell data "segment" 1.. ."""
     import pyvista

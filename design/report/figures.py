@@ -21,9 +21,9 @@ from pneunet.reduced import predict
 from pneunet.reduced.rod.laws import SegmentLaw
 
 
-def _at(solve):
+def _at(design, solve):
     """End of the titles of finite element pictures: the pressure, and whether parts overlap in them."""
-    return kPa(solve.pressure) + " (overlaps)" * (solve.walls_overlap or solve.body_overlap)
+    return kPa(design.scaled(solve.pressure)) + " (overlaps)" * (solve.walls_overlap or solve.body_overlap)
 
 
 def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> list[tuple[str, str]]:
@@ -34,10 +34,10 @@ def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> 
         curves.append(("target", run.target, "target"))
     reduced = comparison.reduced if solve is None else comparison.reduced_at_solve
     if reduced is not None:
-        pressure = design.pressure if solve is None else solve.pressure
+        pressure = design.pressure if solve is None else design.scaled(solve.pressure)
         curves.append((f"reduced, {kPa(pressure)}", reduced, "reduced"))
     if solve is not None and solved is not None:
-        curves.append((f"finite elements, {_at(solve)}", solved, "finite elements"))
+        curves.append((f"finite elements, {_at(design, solve)}", solved, "finite elements"))
         s = np.linspace(solve.s[0], solve.s[-1], len(solved))
         bands = segment_bands(design.manipulator, s, solved)
     if not curves:
@@ -56,7 +56,7 @@ def body_pictures(
     """Target, reduced body, finite element body and the reference body from one camera at one scale; fields
     on the finite element body."""
     design, solve = run.design, run.solve
-    pressure = design.pressure if solve is None else solve.pressure
+    pressure = design.pressure if solve is None else design.scaled(solve.pressure)
     reduced = None
     if (comparison.reduced if solve is None else comparison.reduced_at_solve) is not None:
         reduced = bodies.body_mesh(design.manipulator, pressure, law, design.base_pose)
@@ -94,7 +94,7 @@ def body_pictures(
         picture(
             "fe.png",
             [(solved, plainly), solved_edges, *with_target],
-            f"finite elements, {_at(solve)}",
+            f"finite elements, {_at(design, solve)}",
             "The finite element body.",
         )
         for name, field, label, cmap in (
@@ -116,7 +116,7 @@ def body_pictures(
             picture(
                 name,
                 [rendering.coloured(solved, field, limits, cmap), solved_edges],
-                f"{label.split(' (')[0]}, {_at(solve)}",
+                f"{label.split(' (')[0]}, {_at(design, solve)}",
                 f"Finite element body coloured by {label.split(' (')[0]}{beyond}.",
                 (label, limits, cmap),
             )
@@ -142,7 +142,7 @@ def history_picture(
     levels, tips = np.linspace(0, p.max(), 15), []
     for level in levels:
         try:
-            tips.append(predict(design.manipulator, level * MPA_PER_KPA, law).points[-1])
+            tips.append(predict(design.manipulator, design.scaled(level * MPA_PER_KPA), law).points[-1])
         except ConvergenceError:
             break
     for i, (name, colour) in enumerate(zip("xyz", ("#1f6fb2", "#2f9e44", "#d9480f"))):
@@ -186,7 +186,7 @@ def history_picture(
     axes[1, 0].axhspan(axes[1, 0].get_ylim()[0], 0.0, color="#c92a2a", alpha=0.12)
     for ax in axes.flat:
         ax.set_xlabel("pressure (kPa)")
-        ax.axvline(design.pressure * KPA_PER_MPA, color="#868e96", linewidth=0.9, linestyle=":")
+        ax.axvline(design.largest_pressure * KPA_PER_MPA, color="#868e96", linewidth=0.9, linestyle=":")
         ax.set_xlim(left=0.0)
         ax.grid(True, linewidth=0.4, alpha=0.6)
     fig.subplots_adjust(left=0.08, right=0.98, top=0.92, bottom=0.08, wspace=0.24, hspace=0.28)
@@ -213,7 +213,7 @@ def touching_picture(design: DesignFile, solve: Solution, folder: Path) -> list[
     gap = max(s.gap for s in design.manipulator.segments)
     touching = TOUCHING * gap * solve.contact
     around = f"is nearer than {touching:.2g} mm: contact" if touching else "lies behind the other: overlap"
-    title = f"distance of walls, {_at(solve)}"
+    title = f"distance of walls, {_at(design, solve)}"
     draw_walls(folder / "fe_walls.png", surface, lines, walls, gap, title, touching)
     return [
         (

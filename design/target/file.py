@@ -19,7 +19,7 @@ from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, TO_INTERNAL
 from pneunet.design.target.casting import RANGES, Casting
 from pneunet.design.target.shapes import TargetShape, TipPoints, guide_to
 from pneunet.design.target.table import PointsTable, read_points
-from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Piece, Target
+from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Piece, Target
 from pneunet.design.target.wrapfile import wrapped
 from pneunet.geometry.parameters import TWISTING, Segment
 
@@ -288,11 +288,13 @@ def _range(value, key, where):
 
 
 PIECE_KEYS = {
+    PASSIVE: ("kind", "length_mm"),
     TWISTING: ("kind", "length_mm", "tau_rad_per_mm"),
-    BENDING: ("kind", "length_mm", "curvature_per_m"),
+    BENDING: ("kind", "length_mm", "roll_deg", "curvature_per_m"),
     HELICAL: (
         "kind",
         "length_mm",
+        "roll_deg",
         "cylinder_curvature_per_m",
         "pitch_mm",
         "curvature_per_m",
@@ -319,13 +321,14 @@ class _Given(Checked):
     torsion: float | None = quantity("rad_per_m", None, low=-2e3, high=2e3)
     cylinder_curvature: float | None = quantity("per_m", None, above=0, low=1e-6, high=2e3)
     pitch: float | None = quantity("mm", None, low=-1e5, high=1e5)
+    roll: float = quantity("deg", 0.0, low=0, high=270)
 
 
 def _piece(row, where):
     given = from_table(_Given, row, where)
     refuse_unknown(row, PIECE_KEYS[given.kind], where)
     curvature, twist = (given.curvature, given.twist) if given.kind != HELICAL else _helix(given, where)
-    return Piece(given.kind, given.length, twist, curvature)
+    return Piece(given.kind, given.length, twist, curvature, given.roll)
 
 
 def _helix(given, where):

@@ -1,6 +1,6 @@
 """`Target`: what the user wants. Points in space, and what the user says about them beyond that."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
 from pneunet.design.target.shapes import TargetShape, TipPoints, checked_pressures
 from pneunet.geometry.loading import DeadLoads
 
-#: kinds of pieces; straight ones are TWISTING, as the segments are that follow them
-BENDING, HELICAL = "bending", "helical"
+#: kinds of pieces beside TWISTING, which is straight and turns about itself; PASSIVE: straight, no twist wanted
+BENDING, HELICAL, PASSIVE = "bending", "helical", "passive"
 LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
 
 
@@ -25,13 +25,15 @@ class Piece:
     """A part of the target that one segment is to follow; lengths and rates per *deformed* length.
 
     length in mm; twist in rad/mm: the twist tau of a twisting piece, the torsion of a helical one; curvature
-    in 1/mm (Frenet's). None = to be extracted from the points.
+    in 1/mm (Frenet's). None = to be extracted from the points. roll in degrees: by how much the piece is
+    turned about the axis against the section frame that runs through all pieces; 180 bends to the other side.
     """
 
     kind: str
     length: float
     twist: float | None = None
     curvature: float | None = None
+    roll: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,4 +136,4 @@ def _fitted_to(pieces, length):
             f"[[piece]] length_mm: the pieces add up to {total:.4g} mm but the curve is {length:.4g} mm long"
             " (lengths are deformed ones)"
         )
-    return tuple(Piece(p.kind, p.length * length / total, p.twist, p.curvature) for p in pieces)
+    return tuple(replace(p, length=p.length * length / total) for p in pieces)

@@ -11,11 +11,10 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
-from pneunet.base.files.toml import to_table
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad.meshing import refuse_absurd, save, tetrahedral_mesh, write_model
-from pneunet.geometry.designfile import read_design_file
+from pneunet.geometry.designfile import read_design_file, segment_table
 from pneunet.geometry.meshfile import MESH, open_edges, volumes_and_quality
 from pneunet.geometry.parameters import Manipulator
 
@@ -83,7 +82,7 @@ def mesh_manipulator(manipulator: Manipulator, mesh_size: float, directory: str 
 
 def segment_tables(manipulator: Manipulator) -> list[dict]:
     """What a mesh depends on, in file units: every dimension, no material."""
-    return [to_table(s) for s in manipulator.segments]
+    return [segment_table(s) for s in manipulator.segments]
 
 
 def _check(mesh, volumes):

@@ -42,11 +42,17 @@ def solve_cell(
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )
-    return _follow(case, problem, on_state, on_limit_point, on_touch), facts
+    return follow_path(case, problem, on_state, on_limit_point, on_touch), facts
 
 
-def _follow(case, problem, on_state, on_limit_point, on_touch):
-    """Last CellState of the path."""
+def follow_path(
+    case: CellCase,
+    problem: CellProblem,
+    on_state: Callable[[CellState], object] = lambda state: None,
+    on_limit_point: Callable[[LimitPoint], object] = lambda point: None,
+    on_touch: Callable[[float], object] = lambda pressure: None,
+) -> CellState:
+    """`solve_cell` of a CellProblem that has its mesh already: the last CellState of the path."""
     medium, mu = problem.medium, case.segment.material.mu
     options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
     if medium:

@@ -7,6 +7,7 @@ state, its gradient is (force, moment) in the section frame.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -56,8 +57,38 @@ class FreeSection(ABC):
     force = stiffness = psi
 
 
+@dataclass(frozen=True)
+class TurnedSection:
+    """`law` in axes that `rotation` (3, 3) takes its own to: what a roll makes of a section."""
+
+    law: SectionLaw
+    rotation: np.ndarray
+
+    def _turned(self, q: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        q = np.asarray(q, float)
+        return (q.reshape(*q.shape[:-1], 2, 3) @ rotation.T).reshape(q.shape)
+
+    def free_strains(self, P: float | np.ndarray) -> np.ndarray:
+        """(..., 6) minimiser of psi."""
+        return self._turned(self.law.free_strains(P), self.rotation)
+
+    def psi(self, q: np.ndarray, P: float | np.ndarray) -> np.ndarray:
+        """(...,) enthalpy per undeformed length, N."""
+        return self.law.psi(self._turned(q, self.rotation.T), P)
+
+    def force(self, q: np.ndarray, P: float | np.ndarray) -> np.ndarray:
+        """(..., 6) force (N) and moment (N mm)."""
+        return self._turned(self.law.force(self._turned(q, self.rotation.T), P), self.rotation)
+
+    def stiffness(self, q: np.ndarray, P: float | np.ndarray) -> np.ndarray:
+        """(..., 6, 6) in N, N mm and N mm2."""
+        both = np.kron(np.eye(2), self.rotation)
+        return both @ self.law.stiffness(self._turned(q, self.rotation.T), P) @ both.T
+
+
 class SegmentLaw(ABC):
-    """What predicts the free strains of the middle of a long segment; `name`: what --law calls it."""
+    """What predicts the free strains of the middle of a long segment with chambers, in the segment's own axes
+    whatever its roll (reduced.rod.ends turns them); `name`: what --law calls it."""
 
     name: str
 
