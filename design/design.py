@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pneunet.design.report.rundata import Solution
+    from pneunet.design.search.inverse import Candidate
+    from pneunet.design.search.tolerances import Tolerances
 
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
@@ -42,15 +44,19 @@ class Design:
     """What to cast, and at what pressure.
 
     content: what design.toml says. law: what predicts. target: what was wanted, if anything was.
-    active_bounds, widened_ranges: of the search, in words. effort: what run.json says of the search.
+    active_bounds: of the search, in words. effort: what run.json says of the search. Of a fresh search alone,
+    tolerances: what small changes do to the shape; alternatives: distinct bodies that do nearly as well;
+    stopped_by: the bound that costs most, in words.
     """
 
     content: DesignFile
     law: SegmentLaw = field(default_factory=choose_law)
     target: Target | None = None
     active_bounds: tuple[str, ...] = ()
-    widened_ranges: tuple[str, ...] = ()
     effort: dict = field(default_factory=dict)
+    tolerances: "Tolerances | None" = None
+    alternatives: "tuple[Candidate, ...]" = ()
+    stopped_by: str = ""
 
     @classmethod
     def of(
@@ -86,7 +92,6 @@ class Design:
             chosen_law(folder.law if law is None else law),
             None if folder.target is None else Target(folder.target, content.name),
             tuple(told.get("active_bounds", ())),
-            tuple(told.get("grown_ranges", ())),
             {key: folder.record[key] for key in EFFORT if key in folder.record},
         )
 
@@ -97,6 +102,11 @@ class Design:
         if errors := known.get("errors"):
             told += f"; RMS {errors.rms:.2f} mm ({errors.percent(errors.rms):.2f} %)"
         return f"<Design {self.content.name}: {told}{f'; {len(self.doubts)} doubts' * ('doubts' in known)}>"
+
+    @property
+    def followed(self) -> bool:
+        """Whether the prediction follows all of the target; true without one."""
+        return self.errors is None or not self.errors.not_followed
 
     @property
     def manipulator(self) -> Manipulator:

@@ -40,6 +40,11 @@ def significant(value: float, digits: int = 4) -> str:
     return plain(round(value, decimals), max(decimals, 0))
 
 
+def signed(value: float, digits: int = 4) -> str:
+    """`significant` with a plus before what is positive."""
+    return "+" * (value > 0) + significant(value, digits)
+
+
 def segment_mode(segment: Segment) -> str:
     """What a segment does: twisting or nothing (passive); bending at exactly 90 degrees; else helical."""
     if segment.kind in (TWISTING, PASSIVE):

@@ -22,7 +22,8 @@ from pneunet.reduced.choice import TRAINED
 DISTANCES = ("smallest_wall_distance_mm", "body_distance_mm")
 #: what the report reads of the records, and of what type it is where it stands there
 OF_DESIGN: dict[str, Any] = {"inputs": dict, "inputs.law": str}
-OF_SOLVE: dict[str, Any] = {"contact": bool, "control": str, "limit_points": list, "pressure_kPa": Real}
+OF_SOLVE: dict[str, Any] = {"contact": bool, "control": str, "limit_points": list}
+OF_SOLVE |= {"pressure_kPa": Real, "mesh_size_mm": Real}
 OF_SOLVE |= {
     f"{touch}_{what}": Real
     for touch in ("first_touch", "first_body_touch")

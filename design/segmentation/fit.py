@@ -227,9 +227,7 @@ class Fit:
         start = self.rod.start.copy()
         start[:3, :3] = se3.exp_rotation(full[:3]) @ start[:3, :3]
         start[:3, 3] += full[3:6]
-        rod = Rod(
-            start, self.rod.joints + full[6 : 5 + n], self.rod.strains + full[5 + n :].reshape(n, 2)
-        )
+        rod = Rod(start, self.rod.joints + full[6 : 5 + n], self.rod.strains + full[5 + n :].reshape(n, 2))
         slide = self.away[:, 0] - self.slopes[:, 0, self.columns] @ step
         return Fit(self.data, rod, self.free, self.feet + slide)
 

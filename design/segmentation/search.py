@@ -13,11 +13,13 @@ import numpy as np
 from pneunet.design.segmentation.fit import STRAIN, Fit, capped, refined
 from pneunet.design.segmentation.rod import Rod
 
-TRIES = 14  # moves tried before a rod is taken for the best
+TRIES = 20  # moves tried before a rod is taken for the best
 HOPE = -8.0  # predicted gain below which a move is not tried
 BETTER = 0.02  # of the criterion: a smaller gain is none
 CUT = 5.0  # mm between the places at which a piece may be cut
 ROUNDS = 40
+POLISH = 60  # steps of the last refinement
+SHIFT = 10.0  # mm by which a joint is displaced to see whether it settles in a better place
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +48,28 @@ def searched(fit: Fit, most: int) -> Fit:
     for _ in range(ROUNDS):
         options = [m for m in moves(fit, most) if m.gain > HOPE]
         for move in sorted(options, key=lambda m: -m.gain)[:TRIES]:
-            trial = refined(move.made())
+            trial = untwisted(refined(move.made()))
             if trial.criterion < fit.criterion - BETTER:
                 fit = trial
                 break
         else:
-            return fit
-    return fit
+            break
+    return refined(fit, POLISH, 1e-4)
+
+
+def untwisted(fit: Fit) -> Fit:
+    """The same curve with the twists of its twisting pieces within a quarter turn: half a turn more bends all
+    that follows to the other side, which a rolled piece does without it. With frames it would show."""
+    if fit.data.frames is not None:
+        return fit
+    strains, lengths = fit.rod.strains.copy(), fit.lengths
+    for i in np.flatnonzero(fit.free[:, 0] & ~fit.free[:, 1]):
+        half_turns = np.round(strains[i, 0] * lengths[i] / np.pi)
+        strains[i, 0] -= half_turns * np.pi / lengths[i]
+        strains[i + 1 :, 1] *= (-1) ** half_turns
+    if (strains == fit.rod.strains).all():
+        return fit
+    return Fit(fit.data, Rod(fit.rod.start, fit.rod.joints, strains), fit.free, fit.feet)
 
 
 def moves(fit: Fit, most: int) -> Iterator[Move]:
@@ -64,7 +81,7 @@ def moves(fit: Fit, most: int) -> Iterator[Move]:
         return len(free) <= most and allowed(free, framed, based)
 
     n = len(fit.free)
-    for move, free in (*_simpler(fit), *_richer(fit), *_merged(fit), *_without(fit)):
+    for move, free in (*_simpler(fit), *_richer(fit), *_merged(fit), *_without(fit), *_shifted(fit)):
         if fits(free):
             yield move
     if n < most:
@@ -131,7 +148,8 @@ def _score(fit, columns):
     across = weight * (flat.T @ own)
     answers = -fit.covariance @ across.T
     curvature = weight * (flat.T @ flat) + across @ answers
-    return weight * (flat.T @ fit.misfit.ravel()), curvature, answers
+    gradient = weight * (flat.T @ fit.misfit.ravel()) + answers.T @ fit.normal[1]
+    return gradient, curvature, answers
 
 
 def _richer(fit):
@@ -139,7 +157,7 @@ def _richer(fit):
     for piece, a in zip(*np.nonzero(~fit.free)):
         column = fit.slopes[:, 1:, 5 + n + 2 * piece + a, None]
         gradient, curvature, answers = _score(fit, column)
-        h = curvature[0, 0] + 1 / STRAIN**2
+        h = max(curvature[0, 0], 0.0) + 1 / STRAIN**2
         value = gradient[0] / h
         free = fit.free.copy()
         free[piece, a] = True
@@ -212,6 +230,22 @@ def _without(fit):
 
         short = fit.lengths[i] < 2 * fit.data.shortest
         yield Move("omit", HOPE + 1.0 if short else HOPE - 1.0, made), free
+
+
+def _shifted(fit):
+    """A joint may have settled in the wrong place: it is displaced as far as there is room."""
+    for i in range(len(fit.rod.joints)):
+        for side, room in ((-1, fit.lengths[i]), (1, fit.lengths[i + 1])):
+            if room < SHIFT + fit.data.shortest / 2:
+                continue
+
+            def made(i=i, side=side):
+                row = np.zeros((1, len(fit.columns)))
+                row[0, 6 + i] = 1.0
+                step, _ = _conditional(fit, row, np.array([-side * SHIFT]))
+                return _changed(fit, step)
+
+            yield Move("shift", HOPE + 0.5, made), fit.free
 
 
 def _split(fit):
@@ -293,7 +327,7 @@ def _twisted(fit):
         if fit.data.frames is not None:
             return
         gradient, curvature, answers = _score(fit, column)
-        h = curvature[0, 0] + 1.0
+        h = max(curvature[0, 0], 0.0) + 1.0
         angle = gradient[0] / h
         length = fit.data.shortest
         free = np.insert(fit.free, i + 1, [True, False], axis=0)

@@ -41,7 +41,5 @@ class Segmentation:
         return np.cumsum([piece.length for piece in self.pieces])[:-1]
 
     def __repr__(self) -> str:
-        told = ", ".join(
-            f"{p.kind}{' (rolled)' * bool(p.roll)} {p.length:.1f} mm" for p in self.pieces
-        )
+        told = ", ".join(f"{p.kind}{' (rolled)' * bool(p.roll)} {p.length:.1f} mm" for p in self.pieces)
         return f"<Segmentation: {told}; rms {self.rms:.3f} mm, noise {self.noise:.3f} mm>"

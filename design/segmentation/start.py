@@ -10,7 +10,6 @@ from pneunet.design.segmentation.rod import Rod, advance
 from pneunet.design.segmentation.windows import Stretch, Stretches
 from pneunet.design.target.extraction import turn_about_axis
 
-PRICE = 6.0  # of a strain or a joint, in units of the noise's variance; any from 4 to 20 serves
 FREE_FRAME = 5.0  # what a stretch's own frame explains more than a rod's continuous one would
 HALF_TURN = np.diag([1.0, -1.0, -1.0])
 
@@ -28,38 +27,43 @@ class _Part:
     after: np.ndarray
 
 
-def _wanted(stretch, variance):
-    """(cost, (k1, k2) wanted): the cheapest of straight, circle and helix for a stretch."""
+def _options(stretch, variance, framed, price):
+    """[(cost, (k1, k2) wanted)] of a stretch as straight, circle and helix."""
     square, (torsion, bend) = stretch.square / variance, stretch.wald / variance
-    options = (
-        (square + min(bend + torsion, 2 * bend), (False, False)),
-        (square + torsion + PRICE, (False, True)),
-        (square + 2 * PRICE, (True, True)),
+    # without frames a straight stretch may have any torsion
+    straight = bend + torsion if framed else bend
+    return (
+        (square + straight, (False, False)),
+        (square + torsion + price, (False, True)),
+        (square + 2 * price, (True, True)),
     )
-    return min(options)
 
 
-def chain(stretches: Stretches, noise: float) -> list[tuple[Stretch, np.ndarray]]:
+def chain(stretches: Stretches, noise: float, price: float) -> list[tuple[Stretch, np.ndarray]]:
     """The stretches, each with (2,) whether k1 and k2 are wanted, that together cover the curve at the least
-    price: dynamic programming over the cells."""
+    price (of a strain and of half a joint, in units of the noise's variance): dynamic programming over the
+    cells. No two straight ones follow each other."""
     count = len(stretches.edges) - 1
-    best: list[tuple[float, tuple | None]] = [(0.0, None)] + [(np.inf, None)] * count
+    framed = stretches.frames is not None
+    #: of every cell's end, by whether what ends there is straight: cost, stretch and what comes before it
+    best: list[dict[bool, tuple]] = [{False: (0.0, None, None, None)}] + [{} for _ in range(count)]
     by_end: list[list[Stretch]] = [[] for _ in range(count + 1)]
     for stretch in stretches.found.values():
         by_end[stretch.last].append(stretch)
     for last in range(1, count + 1):
         for stretch in by_end[last]:
-            before = best[stretch.first][0]
-            if np.isfinite(before):
-                cost, wanted = _wanted(stretch, noise**2)
-                cost += before + 2 * PRICE + FREE_FRAME
-                if cost < best[last][0]:
-                    best[last] = (cost, (stretch, np.array(wanted)))
-    found, last = [], count
+            for cost, wanted in _options(stretch, noise**2, framed, price):
+                straight = not framed and not wanted[1]
+                for before, step in best[stretch.first].items():
+                    total = step[0] + cost + 2 * price + FREE_FRAME
+                    if not (straight and before) and total < best[last].get(straight, (np.inf,))[0]:
+                        best[last][straight] = (total, stretch, np.array(wanted), before)
+    found: list[tuple[Stretch, np.ndarray]] = []
+    last, straight = count, min(best[count], key=lambda s: best[count][s][0])
     while last:
-        step = best[last][1]
-        found.insert(0, step)
-        last = step[0].first
+        _, stretch, wanted, straight = best[last][straight]
+        found.insert(0, (stretch, wanted))
+        last = stretch.first
     return found
 
 
@@ -79,10 +83,12 @@ def _parts(stretches, chosen):
     return parts
 
 
-def first_rods(data: Observations, stretches: Stretches, loose: tuple[float, ...]) -> list[Fit]:
+def first_rods(
+    data: Observations, stretches: Stretches, loose: tuple[float, ...], price: float
+) -> list[Fit]:
     """The chain's rods, not yet refined, one for each bound of `loose` (rad): where two curved pieces meet in
     planes further apart, modulo half a turn, a twisting piece is put between."""
-    chosen = chain(stretches, stretches.noise)
+    chosen = chain(stretches, data.noise, price)
     parts = _parts(stretches, chosen)
     rods, seen = [], set()
     for bound in loose:

@@ -27,9 +27,7 @@ def arc_lengths(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     n = len(points)
     stride = max(1, min(8, n // 12))
-    near, far = (
-        np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride)
-    )
+    near, far = (np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride))
     spacing = np.sqrt(max(far - near, 1e-3 * far) / 3) / stride
     half = min(int(SMOOTH / spacing), (n - 1) // 2)
     if half < 2:

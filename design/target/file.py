@@ -19,7 +19,7 @@ from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, TO_INTERNAL
 from pneunet.design.target.casting import RANGES, Casting
 from pneunet.design.target.shapes import TargetShape, TipPoints, guide_to
 from pneunet.design.target.table import PointsTable, read_points
-from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Piece, Target
+from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Piece, SplitOptions, Target
 from pneunet.design.target.wrapfile import wrapped
 from pneunet.geometry.parameters import TWISTING, Segment
 
@@ -111,6 +111,7 @@ def _from_toml(path):
         material=PAPER_TWISTING if material is None else material_from_table(material, f"{where} [material]"),
         casting=_casting(table.get("casting", {}), f"{where} [casting]"),
         start=_start(table.get("segment", {}), f"{where} [segment]"),
+        split=from_table(SplitOptions, table.get("split", {}), f"{where} [split]"),
         vary=_vary(table["vary"], f"{where} [vary]") if "vary" in table else None,
     )
 

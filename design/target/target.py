@@ -9,6 +9,7 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic
+from pneunet.base.quantities import Checked, quantity
 from pneunet.design.target.casting import Casting
 from pneunet.design.target.points import checked_frames, checked_points, checked_weights
 from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
@@ -36,6 +37,17 @@ class Piece:
     roll: float = 0.0
 
 
+@dataclass(frozen=True)
+class SplitOptions(Checked):
+    """How a curve without given pieces is split."""
+
+    tolerance: float | None = quantity(
+        "mm", None, "noise to be assumed at least; default 0.0002 of the length", above=0, high=100
+    )
+    most_pieces: int = quantity(None, 8, "pieces at most", low=1, high=20)
+    shortest: float = quantity("mm", 20.0, "length of the shortest piece", low=1, high=1000)
+
+
 @dataclass(frozen=True, eq=False)
 class Target:
     """points (n, 3) in mm from base to tip, and optionally
@@ -47,7 +59,7 @@ class Target:
     coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of several groups of
     segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip: `TipPoints` as the
     pressure rises; material; casting: what can be cast; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice; source: name of the file that it was read from."""
+    Segment: (low, high)} or None for the default choice; split: how it is split without pieces; source: name of the file that it was read from."""
 
     points: np.ndarray
     name: str = "target"
@@ -59,6 +71,7 @@ class Target:
     material: Hyperelastic = PAPER_TWISTING
     start: dict = field(default_factory=dict)
     vary: dict[str, tuple[float, float]] | None = None
+    split: SplitOptions = field(default_factory=SplitOptions)
     source: str = ""
     weights: np.ndarray | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -98,7 +98,7 @@ def _check(mesh, volumes):
         raise InputError(
             "mesh: the cavity's or the body's surface is not closed: walls touch or cut each other"
         )
-    cell_volumes, quality = volumes_and_quality(mesh.points[mesh.tetrahedra])
+    cell_volumes, quality = volumes_and_quality(mesh.points[mesh.cells])
     mesh_volume = float(cell_volumes.sum())
     if abs(mesh_volume - volumes["body_mm3"]) > 1e-6 * volumes["body_mm3"]:
         raise InputError(
@@ -108,8 +108,8 @@ def _check(mesh, volumes):
     return {
         "mesh_volume_mm3": mesh_volume,
         "areas": areas,
-        "cells": len(mesh.tetrahedra),
-        "vertices": len(np.unique(mesh.tetrahedra)),
+        "cells": len(mesh.cells),
+        "vertices": len(np.unique(mesh.cells)),
         "smallest_quality": float(quality.min()),
         "quality_5_percent": float(np.percentile(quality, 5)),
         "cavity_closed": True,

@@ -27,6 +27,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.rod_coordinates import RodCoordinates
 from pneunet.hifi.path.stepping import Step, StepResult, StepSize, run_steps
+from pneunet.hifi.path.system import PathControl
 
 #: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how
 #: far they strain
@@ -131,9 +132,12 @@ class ManipulatorSolve:
         else:
             self._set_dead(1.0)
             self.system.steer(self._set_pressure, float(self.pressure.value.value))
-        control = {"volume": VolumeControl, "arc length": lambda: ArcLength(self.system)}.get(
-            stage, LoadControl
-        )()
+        controls: dict[str, Callable[[], PathControl]] = {
+            DEAD_LOADS: lambda: LoadControl("the dead loads"),
+            "volume": VolumeControl,
+            "arc length": lambda: ArcLength(self.system),
+        }
+        control = controls.get(stage, LoadControl)()
         start = {"volume": self.system.volume(), "arc length": 0.0}.get(stage, self.system.load)
         before, self.stage = self.path, stage
         self.path = EquilibriumPath(self.system, control, self.newton_options, start)

@@ -130,7 +130,8 @@ def _hold(problem, free, case, options, on_step):
     system = CellSystem(problem, held, (case.pressure, 0.0), (start, change))
     system.state = free.state.copy()
     try:
-        run_steps(EquilibriumPath(system, LoadControl(), options), 1.0, StepSize(0.25, 1e-3), on_step)
+        path = EquilibriumPath(system, LoadControl("the way to the held strains"), options)
+        run_steps(path, 1.0, StepSize(0.25, 1e-3), on_step)
     except BaseException:
         system.destroy()
         raise

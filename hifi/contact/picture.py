@@ -30,7 +30,7 @@ def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> b
         distances = node_distances(CellWalls(problem), state.array)
     finally:
         problem.strains.value[:] = kept
-    facets = surface.facet_nodes(problem, tags.OUTER)
+    facets = surface.wall_triangles(problem, tags.OUTER)
     of_facets = distances[facets]
     facing = np.isfinite(of_facets).all(axis=1)
     if not facing.any():
@@ -65,8 +65,8 @@ def node_distances(walls: CellWalls, array: np.ndarray) -> np.ndarray:
     out = np.full(len(walls.problem.nodes), np.nan)
     for pair in walls.gaps:
         placed = [walls.positions(wall, array) for wall in pair]
-        for (facets, _), own, other in zip(pair, placed, placed[::-1]):
-            np.fmin.at(out, facets.ravel(), distances_from(other, own.reshape(-1, 3)))
+        for wall, own, other in zip(pair, placed, placed[::-1]):
+            np.fmin.at(out, wall.facets.ravel(), distances_from(other, own.reshape(-1, 3)))
     return out
 
 

@@ -35,7 +35,9 @@ class Solid:
 def held_at(problem: CellProblem, held: np.ndarray, strains: np.ndarray) -> CellState:
     """(CellState at the `strains` (6,) that are `held` (6,) bool, the others free; unknowns)."""
     system = CellSystem(problem, held, (0.0, 0.0), (REST, np.where(held, strains - REST, 0.0)))
-    path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    path = EquilibriumPath(
+        system, LoadControl("the held strains"), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
+    )
     run_steps(path, 1.0, StepSize(0.25, 1e-3))
     state = system.measure()
     system.destroy()

@@ -121,7 +121,7 @@ def _fields(folder, manipulator, line):
     local = rest * [0, 1, 1]
     moved = np.einsum("nij,nj->ni", poses[:, :3, :3], local) + poses[:, :3, 3]
     grid.point_data["displacement"] = moved - rest
-    grid.point_data["stretch"] = 1 + 0.1 * np.abs(rest[:, 2])
+    grid.point_data["mean_stretch"] = 1 + 0.1 * np.abs(rest[:, 2])
     grid.point_data["pressure"] = np.zeros(grid.n_points)
     facing = (rest[:, 2] > 2) & (np.abs(rest[:, 0] - 20.0) < 5)
     grid.point_data["wall_distance_mm"] = np.where(facing, 0.1 * rest[:, 1], np.nan)

@@ -117,6 +117,35 @@ def test_rendered_scale_is_the_views_scale():
     assert np.ptp(rows) * view.millimetres_per_pixel == pytest.approx(20.0, rel=0.02)
 
 
+def test_curves_in_front_lie_where_bodies_are_rendered():
+    pyvista = pytest.importorskip("pyvista")
+    from pneunet.base.pictures.rendering import render, view_of
+
+    view, place = view_of(np.array([[-30.0, 0, 0], [30, 0, 0], [0, 20, 20]])), np.array([15.0, 4, 6])
+    ball = pyvista.Sphere(radius=2.0, center=place), {"color": "black", "ambient": 1.0, "diffuse": 0.0}
+    rows, columns = np.nonzero((render(view, [ball]) < 128).all(axis=2))
+    assert view.pixels(place[None])[0] == pytest.approx([columns.mean(), rows.mean()], abs=1.0)
+
+
+@pytest.mark.parametrize("size", [(100, 10, 10), (10, 100, 50), (10, 10, 100)])
+def test_curves_in_3d_fill_their_place(size):
+    pytest.importorskip("matplotlib")
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    from pneunet.base.pictures.rendering import figure
+    from pneunet.design.report.pictures import FILLED, curve_panels
+
+    fig = figure(11.0, 6.2)
+    points = np.random.default_rng(1).random((200, 3)) * size
+    curve_panels(fig, [("target", points, "target")])
+    fig.draw_without_rendering()
+    ax = fig.axes[0]
+    x, y, _ = proj_transform(*points.T, ax.get_proj())
+    place = ax.get_position(original=True).transformed(fig.transFigure)
+    seen = np.ptp(ax.transData.transform(np.column_stack([x, y])), axis=0) / [place.width, place.height]
+    assert 0.6 * FILLED < seen.max() < FILLED
+
+
 def test_design_picture(tmp_path):
     pytest.importorskip("matplotlib")
     from pneunet.design.design import Design

@@ -158,7 +158,10 @@ PIECE = '[[piece]]\nkind = "{}"\nlength_mm = 50\n{}'
         ('target = "squid"', "'squid' is not shipped: shipped are octopus, pear, tentacle2, vase"),
         ('target = "vase"\npoints = "curve.csv"', "exclude each other"),
         ('points = "curve.csv"\n[piece]\nkind = "bending"', "double brackets"),
-        ('points = "curve.csv"\n' + PIECE.format("curly", ""), "write 'passive', 'twisting', 'bending' or 'helical'"),
+        (
+            'points = "curve.csv"\n' + PIECE.format("curly", ""),
+            "write 'passive', 'twisting', 'bending' or 'helical'",
+        ),
         ('points = "curve.csv"\n[[piece]]\nkind = "bending"', "key 'length_mm' is missing"),
         (
             'points = "curve.csv"\n' + PIECE.format("bending", "").replace("50", "70"),

@@ -61,7 +61,7 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
     assert np.ptp(z[~on_side], axis=1) == pytest.approx(0.0, abs=1e-9)
     ends = first.chamber_positions[0] - first.pitch / 2, BOTH.length - last.end_wall
     assert (x.min(), x.max()) == pytest.approx(ends)
-    assert set(stored.tetrahedron_tags) == {tags.BODY, tags.BODY + 1}
+    assert set(stored.cell_tags) == {tags.BODY, tags.BODY + 1}
 
 
 def test_the_same_mesh_again(meshed, tmp_path):

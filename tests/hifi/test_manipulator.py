@@ -114,7 +114,7 @@ def test_pressure_out_of_reach_keeps_what_converged(shared_directory):
     soft = Manipulator((Segment("one-sided", 90.0, 1, chamber_height=8.0, **thin),))
     solve = ManipulatorSolve(soft, meshed(soft, shared_directory))
     reached = []
-    with pytest.raises(ConvergenceError, match="stopped at load"):
+    with pytest.raises(ConvergenceError, match=r"stopped at [\d.]+ kPa"):
         solve.run(2.0, lambda m: reached.append(m.pressure))
     assert reached and solve.path.parameter == reached[-1] < 2.0
     solve.destroy()

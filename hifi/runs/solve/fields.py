@@ -22,10 +22,10 @@ TO_VTK = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
 class FieldWriter:
     """Gathers fields on rank 0 and writes them with VTK, so that files are the same for any number of ranks.
 
-    At points: displacement (mm), pressure (the multiplier, MPa), stretch (largest principal) and
-    wall_distance_mm, on facing walls the signed distance from the wall opposite and nan elsewhere; as field
-    data the marks of hifi.contact.touch. Each .vtu appears by rename when it is whole, and only then in
-    solution.pvd: a killed run leaves valid files.
+    At points: displacement (mm), pressure (the multiplier, MPa), mean_stretch (largest principal, mean of the
+    cells around a node) and wall_distance_mm, on facing walls the signed distance from the wall opposite and
+    nan elsewhere; as field data the marks of hifi.contact.touch. Each .vtu appears by rename when it is
+    whole, and only then in solution.pvd: a killed run leaves valid files.
     """
 
     def __init__(self, directory: Path, solve: ManipulatorSolve, goal: Goal) -> None:
@@ -80,7 +80,7 @@ class FieldWriter:
         fields = {
             "displacement": self.problem.displacement()[: self._owned],
             "pressure": self._pressure_at_nodes()[: self._owned],
-            "stretch": self.stretch.nodal()[: self._owned],
+            "mean_stretch": self.stretch.nodal()[: self._owned],
         }
         fields = {name: gathered(self.comm, values) for name, values in fields.items()} | {
             "wall_distance_mm": self._wall_distance()

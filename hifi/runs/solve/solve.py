@@ -117,8 +117,8 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
         told.accepted(solve.measure())
     result = StepResult() if complete else _walk(solve, goal, told, record, milestones, before)
     last, status = told.last, f"reached the {goal.noun} asked for"
+    reached = solve.path.told(solve.path.parameter)
     if result.reason:
-        reached = goal.where(solve.stage, solve.path.parameter)
         status = f"stopped at {reached} of {goal.key} = {goal.value:g}: {result.reason}"
     elif "tip_stiffness" in missing:
         extras["tip_stiffness"] = tip.stiffness(solve)
@@ -126,14 +126,14 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
         record.finished(status, last, result.failures)
     solve.destroy()
     if result.reason:
-        raise ConvergenceError(goal.failure(last, solve.stage, solve.path.parameter, result, out))
+        raise ConvergenceError(goal.failure(last, solve.stage, reached, result, out))
     if "blocked_force" in missing:
         log.info("blocked force: the same body with its tip held")
         held = design.manipulator, mesh_path, last.pressure, loads, comm, penalty
         extras["blocked_force"] = tip.blocked_force(*held)
         with room_in(out, RESUME):
             record.finished(status, last, result.failures)
-    ending = goal.done(last, solve.stage, solve.path.parameter)
+    ending = goal.done(last, solve.stage, reached)
     log.info("; ".join([ending, *(point.text for point in last.limit_points), f"results in {out}"]))
     return last
 
@@ -146,7 +146,7 @@ def _walk(solve, goal, told, record, milestones, before):
         with deferred():
             return solve.run(target, told.accepted, milestones, before=before, control=goal.control)
     except Interrupted:
-        status = f"interrupted at {goal.where(solve.stage, solve.path.parameter)}"
+        status = f"interrupted at {solve.path.told(solve.path.parameter)}"
         with room_in(record.directory, RESUME):
             record.finished(status, told.last)
         text = f"{status}; the result up to there is in {record.directory}: --resume goes on from it"
@@ -180,7 +180,7 @@ def _go_on(kept, solve, goal, tables, out):
         raise InputError(
             f"{out / CHECKPOINT}: has passed {goal.key} = {goal.value:g} already: solve without --resume"
         )
-    log.info(f"resumed after step {step.number} at {goal.where(solve.stage, step.load)}")
+    log.info(f"resumed after step {step.number} at {solve.path.told(step.load)}")
     return step, measured
 
 
