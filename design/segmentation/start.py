@@ -83,9 +83,7 @@ def _parts(stretches, chosen):
     return parts
 
 
-def first_rods(
-    data: Observations, stretches: Stretches, loose: tuple[float, ...], price: float
-) -> list[Fit]:
+def first_rods(data: Observations, stretches: Stretches, loose: tuple[float, ...], price: float) -> list[Fit]:
     """The chain's rods, not yet refined, one for each bound of `loose` (rad): where two curved pieces meet in
     planes further apart, modulo half a turn, a twisting piece is put between."""
     chosen = chain(stretches, data.noise, price)

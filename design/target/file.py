@@ -19,7 +19,15 @@ from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, TO_INTERNAL
 from pneunet.design.target.casting import RANGES, Casting
 from pneunet.design.target.shapes import TargetShape, TipPoints, guide_to
 from pneunet.design.target.table import PointsTable, read_points
-from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Piece, SplitOptions, Target
+from pneunet.design.target.target import (
+    BENDING,
+    HELICAL,
+    PASSIVE,
+    PRESSURE_LIMIT,
+    Piece,
+    SplitOptions,
+    Target,
+)
 from pneunet.design.target.wrapfile import wrapped
 from pneunet.geometry.parameters import TWISTING, Segment
 

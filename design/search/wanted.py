@@ -1,0 +1,86 @@
+"""What is wanted of the segments: the pieces of a target, given or found, and the curve that they follow."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pneunet.design.search.space import RANGES, prototype
+from pneunet.design.segmentation.segment import segment
+from pneunet.design.segmentation.segmentation import Segmentation
+from pneunet.design.target.extraction import Extracted, extract
+from pneunet.design.target.reach import ANGLES, reach
+from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Target
+from pneunet.geometry.parameters import TWISTING
+from pneunet.reduced.rod.laws import SegmentLaw
+
+GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"
+#: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
+FAITHFUL = 2e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """target: with the points that are followed, the fitted curve's where the given ones are noisy or few;
+    pieces of it; note: where they come from; notes: what was assumed or given up."""
+
+    target: Target
+    pieces: tuple[Extracted, ...]
+    note: str
+    notes: tuple[str, ...] = ()
+
+
+def wanted(target: Target, law: SegmentLaw) -> Wanted:
+    """The Wanted of a Target: its own pieces, or those that it is split into."""
+    if target.pieces:
+        return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
+    split = segment(target, reach=reachable(target, law))
+    followed, notes = target, split.notes
+    if abs(target.length - split.length) > FAITHFUL * split.length:
+        followed = _on_curve(target, split.curve)
+        told = f"{target.length:.1f} mm as a polyline, {split.length:.1f} mm smoothed"
+        notes += (f"followed is the smooth curve: noise {split.noise:.2g} mm a coordinate; {told}",)
+    scale = followed.length / split.length
+    pieces = tuple(replace(p, length=p.length * scale) for p in _extracted(split, followed))
+    return Wanted(followed, pieces, FOUND_NOTE, notes)
+
+
+def reachable(target: Target, law: SegmentLaw) -> dict[str, tuple[float, float]]:
+    """{kind of piece: (largest |twist|, largest curvature)} in 1/mm that segments of usual dimensions reach
+    at the highest allowed pressure; up to half a large change of the chambers' height more than at first."""
+    pressure = target.pressure_range[1] if target.pressure_range else PRESSURE_LIMIT
+    out = {}
+    for kind in (BENDING, TWISTING):
+        like = prototype(target, Extracted(kind, 50.0, 0.0, 0.0, 0.0))
+        heights = {"chamber_height": [like.chamber_height, like.chamber_height + _half(like.kind)]}
+        vary = {"chamber_height": target.vary["chamber_height"]} if target.vary else heights
+        found = reach(like, [pressure], law, ANGLES, vary)
+        across = int(np.argmin(abs(found.angles - 90.0)))
+        twist = float(np.nanmax(abs(found.twist), initial=0.0))
+        if kind == TWISTING:
+            out[TWISTING] = twist, 0.0
+        else:
+            out[BENDING] = 0.0, float(np.nan_to_num(found.curvature[across, 0]))
+            out[HELICAL] = twist, float(np.nanmax(found.curvature, initial=0.0))
+    return out
+
+
+def _half(kind):
+    return RANGES[kind]["chamber_height"][1] / 2
+
+
+def _on_curve(target, curve):
+    """The Target with a Curve's points instead of its own, and the frames that were nearest by arc length."""
+    frames = target.frames
+    if frames is not None:
+        s, own = curve.arc_lengths / curve.length, target.curve.arc_lengths / target.length
+        frames = frames[np.abs(own[:, None] - s).argmin(axis=0)]
+    return replace(target, points=curve.points, frames=frames, weights=None)
+
+
+def _extracted(split: Segmentation, target: Target):
+    """`Extracted` of the pieces that were found; twists at an end are seen by frames or a fixed base alone."""
+    last = len(split.pieces) - 1
+    for i, p in enumerate(split.pieces):
+        seen = target.frames is not None or (i < last and (i > 0 or target.base_rotation is not None))
+        twist, curvature = p.twist or 0.0, p.curvature or 0.0
+        yield Extracted(p.kind, p.length, twist, curvature, split.rms, seen, "", p.roll)
