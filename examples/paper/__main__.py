@@ -13,7 +13,7 @@ from pneunet.base.files.atomic import write_text
 from pneunet.base.pictures.rendering import save
 
 ROOT = Path(__file__).resolve().parents[2]
-#: 7 and 9_wraps search for designs, which takes a while
+#: 7 and 9_wraps search for designs
 FIGURES = ("3", "4", "5", "6", "7", "8", "9", "9_wraps")
 #: dots an inch of pictures in docs/, which keeps each under 300 kB
 DOCS_DPI = 75

@@ -6,7 +6,7 @@ for in other tests."""
 import numpy as np
 import pytest
 
-from examples.paper import eq27, fig3, fig4, fig5, fig6, fig8, fig9
+from examples.paper import eq27, fig3, fig4, fig5, fig6, fig7, fig8, fig9, fig9_wraps
 from examples.paper.__main__ import section
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING
 
@@ -51,6 +51,19 @@ def test_fig_6_softer_bends_more_until_a_limit_load():
     assert any("limit load" in text for text in found["iii"]["doubts"])
     # P/mu alone decides: 0.4 MPa in (a) and in the middle of (c), at the same angle
     assert found["i"]["curvature"][1] == pytest.approx(found["a"]["curvature"][-1, 1], rel=1e-6)
+
+
+def test_fig_7_two_tentacles_are_designed():
+    found = fig7.compute()
+    assert verdicts(fig7, found) == [True, True, None, None]
+    assert all(design.errors.rms <= 0.7 and design.pressure_kPa == 50 for design in found.values())
+
+
+def test_fig_9_wraps_are_designed():
+    found = fig9_wraps.compute()
+    assert verdicts(fig9_wraps, found) == [None] * 4
+    assert all(design.errors.percent(design.errors.rms) <= 0.2 for design in found.values())
+    assert [len(design.manipulator.segments) for design in found.values()] == [3, 2]  # as the paper's
 
 
 def test_fig_8_extraction_finds_the_printed_numbers():

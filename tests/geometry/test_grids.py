@@ -86,7 +86,9 @@ def faces_of(cells):
 
 def test_a_body_fits_together_and_its_facets_are_its_surface():
     """Segments of all widths, kinds and angles: every face lies between two cells, or is a tagged facet."""
-    body = Manipulator([CASES["one_sided_w10"](60.0, 3), CASES["twist_w15"](120.0, 2), CASES["twist_w12"](90.0, 1)])
+    body = Manipulator(
+        [CASES["one_sided_w10"](60.0, 3), CASES["twist_w15"](120.0, 2), CASES["twist_w12"](90.0, 1)]
+    )
     mesh = body_grid(body, 2.0).mesh()
     faces, counts = np.unique(faces_of(mesh.cells), axis=0, return_counts=True)
     assert set(counts) == {1, 2}
