@@ -3,6 +3,8 @@ counts."""
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from examples.paper.common import Statement
 from examples.paper.eq27 import readings
 from pneunet.design.design import Design
@@ -46,10 +48,11 @@ def draw_designs(designs: dict[str, Design], pressures_kPa: Sequence[float] | No
     for place, (name, design) in enumerate(designs.items(), start=1):
         axes = fig.add_subplot(1, len(designs), place, projection="3d")
         steps = pressures_kPa or [design.pressure_kPa * i / 5 for i in range(1, 6)]
-        for number, (P, line) in enumerate(zip(steps, design.predict(steps))):
+        lines = design.predict(steps)
+        for number, (P, line) in enumerate(zip(steps, lines)):
             axes.plot(*line.points.T, color=colormaps["viridis"](number / 5), label=f"{P:.0f} kPa")
         axes.plot(*design.target.points.T, "k--", linewidth=1.2, label="target")
-        equal_axes_3d(axes, design.target.points)
+        equal_axes_3d(axes, np.vstack([line.points for line in lines]))
         axes.set_title(f"{name}: {angles_of(design)} deg", fontsize=9)
         axes.legend(fontsize=7)
     fig.tight_layout()
