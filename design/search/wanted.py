@@ -14,6 +14,8 @@ from pneunet.geometry.parameters import TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
 
 GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"
+#: of the length, by which a curve may leave its pieces unless the user says: bare ends of segments do so
+TOLERANCE = 1e-3
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
 FAITHFUL = 2e-3
 
@@ -33,7 +35,10 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
     """The Wanted of a Target: its own pieces, or those that it is split into."""
     if target.pieces:
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
-    split = segment(target, reach=reachable(target, law))
+    options = target.split
+    if options.tolerance is None:
+        options = replace(options, tolerance=TOLERANCE * target.length)
+    split = segment(target, options=options, reach=reachable(target, law))
     followed, notes = target, split.notes
     if abs(target.length - split.length) > FAITHFUL * split.length:
         followed = _on_curve(target, split.curve)
