@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.design.search.possible import out_of_reach
 from pneunet.design.search.space import RANGES, limits, prototype
 from pneunet.design.segmentation.segment import segment
 from pneunet.design.segmentation.segmentation import Segmentation
@@ -42,7 +43,7 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
             " there is"
             " nothing to inflate; give points that bend, frames that turn, or a [[piece]] with tau_rad_per_mm"
         )
-    return found
+    return replace(found, notes=(*found.notes, *out_of_reach(target, found.pieces, law)))
 
 
 def _given_or_found(target, law):
@@ -92,7 +93,7 @@ def _on_curve(target, curve):
     """The Target with a Curve's points instead of its own, and the frames and weights that were nearest by
     arc length."""
     s, own = curve.arc_lengths / curve.length, target.curve.arc_lengths / target.length
-    nearest = np.abs(own[:, None] - s).argmin(axis=0)
+    nearest = np.rint(np.interp(s, own, np.arange(len(own)))).astype(int)
     kept = {name: getattr(target, name) for name in ("frames", "weights")}
     kept = {name: values if values is None else values[nearest] for name, values in kept.items()}
     return replace(target, points=curve.points, **kept)
