@@ -31,6 +31,7 @@ from benchmarks import (
     silicones,
     speed,
     verification,
+    workspace,
 )
 from benchmarks.tables import table
 from pneunet.base.files.atomic import write_text
@@ -75,6 +76,7 @@ PARTS = {
             " some seconds"
         ),
     ),
+    "workspace": (workspace.hundred_thousand, "100,000 shapes of one to three segments; some seconds"),
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",

@@ -65,7 +65,7 @@ def predict(
     """
     law, pressure = chosen_law(law), each_in_MPa(pressure_kPa)
     line = prediction.predict(manipulator, pressure, law, base_pose=base_pose)
-    tell_doubts(prediction.doubts(manipulator, pressure, law), law, WARN)
+    tell_doubts(prediction.doubts(manipulator, [pressure], law), law, WARN)
     return line
 
 
