@@ -76,6 +76,7 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     identity = {
         "body": body_tables(design.manipulator),
         "mesh_size_mm": mesh_size,
+        "element": design.element,
         "loads": design.loads.table(),
         "base": design.base_pose.tolist() if design.loads else None,
         "control": goal.control,
@@ -92,7 +93,7 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     tables = Tables(comm, out, solve.walls.gaps, design.shares)
     writer = FieldWriter(out, solve, goal) if fields else None
     log.info(
-        f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size}"
+        f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (Taylor-Hood), {comm.size}"
         f" rank{'s' * (comm.size > 1)}, {goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
     )
     before, last, complete = None, None, False
@@ -214,14 +215,18 @@ def _mesh(design, folder, mesh_size):
     """Facts of the design's mesh in `folder`, which is made where there is none."""
     from pneunet.geometry.cad.mesh import mesh_manipulator, segment_tables
 
-    wanted = {"mesh_size_mm": mesh_size, "segments": segment_tables(design.manipulator)}
+    wanted = {
+        "element": design.element,
+        "mesh_size_mm": mesh_size,
+        "segments": segment_tables(design.manipulator),
+    }
     if (folder / MESH).exists():
         _, facts = read_mesh(folder / MESH)
         if wanted == {name: facts.get(name) for name in wanted} and facts == _facts_for_people(folder):
             return facts
     if folder.is_dir() and any(folder.glob("m*")):
         log.info(f"{folder}: no {MESH} of this body and mesh size with its mesh.json: meshed anew")
-    return mesh_manipulator(design.manipulator, mesh_size, folder)
+    return mesh_manipulator(design.manipulator, mesh_size, folder, design.element)
 
 
 def _facts_for_people(folder):
