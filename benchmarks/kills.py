@@ -64,7 +64,7 @@ COMMANDS = {
         _solved,
     ),
     "campaign": (["campaign.toml"], [], _gathered),
-    "design": (["arc.csv"], [], _designed),
+    "design": (["arc.csv", "--law", "analytic"], [], _designed),  # the trained law takes longer to wake
 }
 
 

@@ -95,7 +95,7 @@ def test_design_writes_what_it_found(folder):
 
 
 def test_design_of_a_bare_csv_says_that_its_split_is_simple(folder, tmp_path):
-    told = pneunet("design", folder / "my arc.csv", cwd=tmp_path)
+    told = pneunet("design", folder / "my arc.csv", "--law", "analytic", cwd=tmp_path)
     assert "simple automatic split" in told
     design = read_design_file(tmp_path / "out" / "my arc" / "design.toml")  # where it goes without -o
     assert "simple automatic split" in design.result["split"]
