@@ -63,6 +63,13 @@ def run_shape(
     log.info(
         f"shape: {design.content.name}, {count} segment{'s' * (count > 1)} at {_list(pressures_kPa)} kPa"
     )
+    with output_folder(Path(directory) / "shape") as folder:
+        _predict(folder, design_path, design, pressures_kPa, outside)
+    return folder
+
+
+def _predict(folder, design_path, design, pressures_kPa, outside):
+    """The shapes of `run_shape`, what is to be said of them, and their files."""
     shapes: dict[float, Centreline] = {}
     failed: dict[float, str] = {}
     for p in sorted(set(pressures_kPa)):
@@ -78,9 +85,7 @@ def run_shape(
     overlaps = ((p, text) for p, line in shapes.items() for text in overlap_doubts(design.manipulator, line))
     doubted += tuple(f"from {plain(p)} kPa on {text}" for p, text in islice(overlaps, 1))
     tell_doubts(doubted, design.law, outside)
-    with output_folder(Path(directory) / "shape") as folder:
-        _write(folder, design_path, design, shapes, failed, doubted)
-    return folder
+    _write(folder, design_path, design, shapes, failed, doubted)
 
 
 def _write(folder, design_path, design, shapes, failed, doubted):

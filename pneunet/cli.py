@@ -26,7 +26,6 @@ NOT_FOLLOWED = 3
 log = logging.getLogger(__name__)
 
 
-
 def design(a: Namespace) -> int:
     from pneunet.design.inverse_design import run_design
     from pneunet.reduced.choice import choose_law
