@@ -59,6 +59,17 @@ def run_shape(
         pressures_kPa = [design.pressure_kPa * i / STEPS for i in range(1, STEPS + 1)]
     if not len(pressures_kPa):
         raise InputError("--pressure-kPa: give at least one pressure")
+    count = len(design.manipulator.segments)
+    log.info(
+        f"shape: {design.content.name}, {count} segment{'s' * (count > 1)} at {_list(pressures_kPa)} kPa"
+    )
+    with output_folder(Path(directory) / "shape") as folder:
+        _predict(folder, design_path, design, pressures_kPa, outside)
+    return folder
+
+
+def _predict(folder, design_path, design, pressures_kPa, outside):
+    """The shapes of `run_shape`, what is to be said of them, and their files."""
     shapes: dict[float, Centreline] = {}
     failed: dict[float, str] = {}
     for p in sorted(set(pressures_kPa)):
@@ -68,13 +79,13 @@ def run_shape(
             failed[p] = str(error)
     if not shapes:
         raise ConvergenceError(f"no shape at {_list(failed)} kPa: {next(iter(failed.values()))}")
-    doubted = doubts(design.manipulator, [in_MPa(p) for p in pressures_kPa], design.law)
+    doubted = doubts(
+        design.manipulator, [design.content.scaled(in_MPa(p)) for p in pressures_kPa], design.law
+    )
     overlaps = ((p, text) for p, line in shapes.items() for text in overlap_doubts(design.manipulator, line))
     doubted += tuple(f"from {plain(p)} kPa on {text}" for p, text in islice(overlaps, 1))
     tell_doubts(doubted, design.law, outside)
-    with output_folder(Path(directory) / "shape") as folder:
-        _write(folder, design_path, design, shapes, failed, doubted)
-    return folder
+    _write(folder, design_path, design, shapes, failed, doubted)
 
 
 def _write(folder, design_path, design, shapes, failed, doubted):
@@ -116,7 +127,7 @@ def _pictures(design, pressures, folder):
     for p, (vertices, quads, segments) in zip(pressures, bodies):
         write_quads(folder / f"body_{plain(p)}kPa.vtp", vertices, quads, {"segment": segments + 1})
     _picture_of_all(design.content.name, pressures, bodies, folder / "bodies.png")
-    log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
+    log.info(f"bodies at every pressure: {folder / 'bodies.png'}; {FRAMES} frames of the inflation follow")
     highest = max(pressures)
     if highest > 0:
         _animation(design, highest, folder / "inflation.gif")
@@ -126,7 +137,8 @@ def _pictures(design, pressures, folder):
 def _bodies(design, pressures):
     """`body_surface` at pressures in kPa."""
     pose = design.content.base_pose
-    return [body_surface(design.manipulator, in_MPa(p), design.law, SPACING, pose) for p in pressures]
+    scaled = [design.content.scaled(in_MPa(p)) for p in pressures]
+    return [body_surface(design.manipulator, p, design.law, SPACING, pose) for p in scaled]
 
 
 def _view(bodies):

@@ -6,7 +6,7 @@ train` (reduced.training.train), stored by reduced.trained.file.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -18,8 +18,9 @@ from pneunet.base.materials.laws import NeoHookean
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.parameters import TWISTING, Segment
-from pneunet.geometry.shape_numbers import normal_pitch, shape_numbers, shapes_of
+from pneunet.geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers, shapes_of
 from pneunet.reduced.rod.laws import SegmentLaw, checked_pressure
+from pneunet.reduced.rod.states import Slopes, StatesWithSlopes
 from pneunet.reduced.trained.coordinates import Coordinates, cosine
 from pneunet.reduced.trained.enthalpy import (
     Anharmonic,
@@ -31,7 +32,6 @@ from pneunet.reduced.trained.enthalpy import (
 )
 from pneunet.reduced.trained.free_path import NEARER, FreePath
 from pneunet.reduced.trained.free_stiffness import FreeStiffness
-from pneunet.reduced.trained.states_with_slopes import Slopes, StatesWithSlopes
 
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so
 TIE_TOLERANCE = 0.02
@@ -195,7 +195,9 @@ class TrainedLaw(SegmentLaw):
         found = self._at(segments, np.broadcast_to(checked_pressure(pressure), len(segments))[:, None])
         return RodStrains(found.e[:, 0], found.k[:, 0])
 
-    def each_with_slopes(self, segments: Sequence[Segment], pressure: float | ArrayLike) -> StatesWithSlopes:
+    def each_with_slopes(
+        self, segments: Sequence[Segment], pressure: float | ArrayLike, names: Collection[str] = SHAPE
+    ) -> StatesWithSlopes:
         """StatesWithSlopes of n segments at a pressure in MPa, one for all or (n,), all at once: free
         strains, how far each lies outside what the law knows, and how far its walls have closed, with exact
         derivatives by dimensions, pressure and modulus.
@@ -233,6 +235,10 @@ class TrainedLaw(SegmentLaw):
         return self._kind(segment).excess(
             shape_numbers(segment)[None], np.array([pressure / segment.material.mu])
         )[0]
+
+    def half_width(self, segment: Segment, pressure: float) -> np.ndarray:
+        """As SegmentLaw.half_width."""
+        return self.of(segment).half_width(pressure)
 
     def doubts(self, segment: Segment, pressure: float | ArrayLike) -> tuple[str, ...]:
         """Reasons, as text, not to trust the law for a segment at a pressure (MPa) or several; () when there

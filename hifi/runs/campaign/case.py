@@ -217,7 +217,7 @@ class Sampler:
         system = CellSystem(self.problem, np.ones(6, bool), (pressure, 0.0), (array[-6:].copy(), change))
         try:
             system.state = array.copy()
-            path = EquilibriumPath(system, LoadControl(), self.options)
+            path = EquilibriumPath(system, LoadControl("the way to the prescribed strains"), self.options)
             result = run_steps(path, 1.0, StepSize(HOLD_STEP, SMALLEST_HOLD_STEP, HOLD_STEP))
             self._record(system.state, result.steps[-1].residual, "prescribed", system)
         finally:

@@ -25,14 +25,15 @@ class Goal:
 
     @classmethod
     def of(cls, design: DesignFile, pressure: float | None = None) -> "Goal":
-        """The design's, or another pressure (MPa); InputError when that makes no sense."""
+        """The design's, or another pressure (MPa; of several groups the largest); InputError when that makes
+        no sense."""
         control = design.control
         if control.name != "pressure" and pressure is not None:
             raise InputError(
                 f'--pressure-kPa does not go with the design\'s control = "{control.name}": change that in'
                 " the design"
             )
-        pressure = design.pressure if pressure is None else pressure
+        pressure = design.largest_pressure if pressure is None else pressure
         if pressure == 0 and not design.loads:
             raise InputError(
                 "pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads] in the design"
@@ -77,16 +78,6 @@ class Goal:
         step."""
         return pressure_kPa if self.control == "pressure" and not self.dead else step
 
-    def where(self, stage: str, parameter: float) -> str:
-        """The place on the path in words."""
-        if stage == DEAD_LOADS:
-            return f"{parameter * 100:.4g} % of the dead loads"
-        return (
-            f"{parameter * KPA_PER_MPA:.4g} kPa"
-            if stage == "pressure"
-            else f"{parameter:.4g} {'mm3' if stage == 'volume' else 'mm'}"
-        )
-
     def plan(self) -> str:
         """What will be walked, in words."""
         inflation = f"{self.key} to {self.value:g}"
@@ -98,13 +89,14 @@ class Goal:
             else inflation
         )
 
-    def done(self, m: Measured, stage: str, parameter: float) -> str:
-        """The last line's beginning, of the last state, and what makes it doubtful."""
+    def done(self, m: Measured, stage: str, reached: str) -> str:
+        """The last line's beginning, of the last state, `reached` in words, and what makes it doubtful."""
         pressure = f" at {m.pressure * KPA_PER_MPA:.4g} kPa" * (stage in ("volume", "arc length"))
-        return f"done: {self.where(stage, parameter)}{pressure}" + f"; {m.touch.text}" * bool(m.touch.text)
+        return f"done: {reached}{pressure}" + f"; {m.touch.text}" * bool(m.touch.text)
 
-    def failure(self, m: Measured, stage: str, parameter: float, result: StepResult, out: Path) -> str:
-        """Why the run ended short of its goal, where its data are, and what to try; m: its last state."""
+    def failure(self, m: Measured, stage: str, reached: str, result: StepResult, out: Path) -> str:
+        """Why the run ended short of its goal, where its data are, and what to try; m: its last state,
+        `reached` in words."""
         if stage == DEAD_LOADS:
             why, remedy = "buckling or too coarse a mesh", "smaller [loads] or a smaller mesh_size_mm"
         else:
@@ -117,7 +109,7 @@ class Goal:
         what = "[loads] were" if stage == DEAD_LOADS else f"{self.key} = {self.value:g} was"
         overlap = f" ({m.touch.text})" * bool(m.touch.text)
         return (
-            f"{what} not reached: stopped at {self.where(stage, parameter)} ({result.reason}),"
+            f"{what} not reached: stopped at {reached} ({result.reason}),"
             f" {result.diagnosis or f'usually by {why}'}; the result up to there is in {out}{overlap}; try"
             f" {remedy}"
         )

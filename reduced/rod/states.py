@@ -32,6 +32,13 @@ class StatesWithSlopes:
     closed: np.ndarray
     closed_by: np.ndarray
 
+    @classmethod
+    def of_strains(cls, strains: np.ndarray, strains_by: np.ndarray) -> "StatesWithSlopes":
+        """Of a law that knows neither doubt nor walls."""
+        n, by = len(strains), strains_by.shape[2]
+        none = np.zeros((n, 0)), np.zeros((n, 0, by)), np.zeros(n), np.zeros((n, by))
+        return cls(strains, strains_by, *none)
+
     @property
     def rod_strains(self) -> RodStrains:
         return RodStrains.of_vector(self.strains)
