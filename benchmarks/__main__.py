@@ -26,6 +26,7 @@ from benchmarks import (
     people,
     remeshed,
     rod,
+    segmentation,
     segments,
     silicones,
     speed,
@@ -79,6 +80,10 @@ PARTS = {
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
+    ),
+    "segmentation": (
+        segmentation.segmentation,
+        "the split of 200 random targets against the pieces that they are made of; some 30 seconds",
     ),
     "people": (people.people, "files as people bring them against the right answer of each; some minutes"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),

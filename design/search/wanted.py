@@ -4,18 +4,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.design.search.possible import out_of_reach
 from pneunet.design.search.space import RANGES, limits, prototype
 from pneunet.design.segmentation.segment import segment
 from pneunet.design.segmentation.segmentation import Segmentation
 from pneunet.design.target.extraction import Extracted, extract
+from pneunet.design.target.points import STRIDE, strides
 from pneunet.design.target.reach import ANGLES, reach
 from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Target
 from pneunet.geometry.parameters import TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
 
 GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"
+REFINED_NOTE = "split given by the user, refined"
 #: of the length, by which a curve may leave its pieces unless the user says: bare ends of segments do so
 TOLERANCE = 1e-3
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
@@ -47,11 +50,11 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
 
 
 def _given_or_found(target, law):
-    if target.pieces:
+    if target.pieces and not target.split.refine:
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
     options = target.split
     if options.tolerance is None:
-        options = replace(options, tolerance=TOLERANCE * target.length)
+        options = replace(options, tolerance=TOLERANCE * _chords(target))
     split = segment(target, options=options, reach=reachable(target, law))
     followed, notes = target, split.notes
     if abs(target.length - split.length) > FAITHFUL * split.length:
@@ -60,7 +63,7 @@ def _given_or_found(target, law):
         notes += (f"followed is the smooth curve: noise {split.noise:.2g} mm a coordinate; {told}",)
     scale = followed.length / split.length
     pieces = tuple(replace(p, length=p.length * scale) for p in _extracted(split, followed))
-    return Wanted(followed, pieces, FOUND_NOTE, notes)
+    return Wanted(followed, pieces, REFINED_NOTE if target.pieces else FOUND_NOTE, notes)
 
 
 def reachable(target: Target, law: SegmentLaw) -> dict[str, tuple[float, float]]:
@@ -83,6 +86,11 @@ def reachable(target: Target, law: SegmentLaw) -> dict[str, tuple[float, float]]
             out[BENDING] = 0.0, float(np.nan_to_num(found.curvature[across, 0]))
             out[HELICAL] = twist, float(np.nanmax(found.curvature, initial=0.0))
     return out
+
+
+def _chords(target):
+    """Length (mm) that noise does not lengthen."""
+    return Curve(target.points[strides(target.points, STRIDE)]).length
 
 
 def _half(kind):

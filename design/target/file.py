@@ -73,7 +73,7 @@ CURVES = ("points", "points_mm", "wrap")
 SHAPE_KEYS = (*CURVES, "frames", "weights", "pressure_kPa")
 KEYS = (
     *("name", "target", *SHAPE_KEYS, "pressure_range_kPa", "gravity_m_per_s2", "shape", "tip_points"),
-    *("piece", "base", "material", "casting", "segment", "vary"),
+    *("piece", "base", "material", "casting", "segment", "split", "vary"),
 )
 
 
