@@ -24,6 +24,14 @@ TOLERANCE = 1e-3
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
 FAITHFUL = 2e-3
 
+#: what a target may ask for that the search does not use yet, by field of Target
+NOT_YET = {
+    "weights": "weights of points",
+    "gravity": "gravity",
+    "shapes": "further shapes",
+    "tip": "points of the tip",
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
@@ -46,7 +54,9 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
             " there is"
             " nothing to inflate; give points that bend, frames that turn, or a [[piece]] with tau_rad_per_mm"
         )
-    return replace(found, notes=(*found.notes, *out_of_reach(target, found.pieces, law)))
+    unused = [words for name, words in NOT_YET.items() if np.any(getattr(target, name))]
+    told = (f"NOT used by the search yet: {', '.join(unused)}",) if unused else ()
+    return replace(found, notes=(*found.notes, *told, *out_of_reach(target, found.pieces, law)))
 
 
 def _given_or_found(target, law):
