@@ -48,6 +48,9 @@ def mesh_manipulator(
     directory = Path(directory)
     started = time.perf_counter()
     refuse_absurd(mesh_size, [(s, s.length, s.chambers) for s in manipulator.segments])
+    log.info(
+        f"mesh: {manipulator.chambers} chambers, {manipulator.length:.0f} mm, elements of {mesh_size:g} mm"
+    )
 
     def facts_of(mesh: VolumeMesh, volumes: dict[str, float]) -> dict:
         # the segments are kept so that a later run knows whether this mesh is still its own

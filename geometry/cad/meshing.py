@@ -31,10 +31,10 @@ def refuse_absurd(mesh_size: float, parts: Iterable[tuple[Segment, float, int]])
     )
     cells = 6 * np.sqrt(2) * room / mesh_size**3  # regular tetrahedra
     if cells > MOST_CELLS:
-        fit = mesh_size * np.cbrt(cells / MOST_CELLS)
+        fit = np.ceil(100 * mesh_size * np.cbrt(cells / MOST_CELLS)) / 100
         raise InputError(
-            f"mesh_size_mm = {mesh_size:g} would give some {cells:.0e} cells, more than {MOST_CELLS:.0e}:"
-            f" choose a coarser mesh, {fit:.2g} mm or more"
+            f"mesh_size_mm = {mesh_size:g} would give some {cells:.3g} cells, more than {MOST_CELLS:g}:"
+            f" choose a coarser mesh, {fit:g} mm or more"
         )
 
 

@@ -1,5 +1,6 @@
 """One pitch of a segment from rest to a pressure, free or at prescribed strains, with its rod stiffness."""
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,6 +21,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath, LimitPoint
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
 
+log = logging.getLogger(__name__)
 #: iterations that a lagged tangent may still need in contact, where tangents age fast
 CONTACT_PATIENCE = 10.0
 
@@ -40,6 +42,7 @@ def solve_cell(
     """
     medium = case.medium if case.contact == "third-medium" else None
     facts = _mesh(case, mesh_path, gaps=medium is not None)
+    log.info(f"cell: {facts['cells']} elements; forms that are new to this machine are compiled")
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )

@@ -86,6 +86,7 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     mesh, kept = on_rank_0(comm, lambda: _prepare(design, directory, mesh_size, identity, resume))
     loads = design.loads.in_body(design.base_pose)
     penalty = WallPenalty() if design.contact == "auto" else None
+    log.info("solve: set up; forms that are new to this machine are compiled, up to a minute")
     solve = ManipulatorSolve(
         design.manipulator, mesh_path, comm, loads=loads, contact=penalty, shares=design.shares
     )
