@@ -1,4 +1,6 @@
-"""Cells on grids of hexahedra: the same solver code, and half turns."""
+"""Cells and bodies on grids of hexahedra: the same solver code, and half turns."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,7 +9,10 @@ from mpi4py import MPI
 
 from pneunet.geometry import tags
 from pneunet.geometry.cad.grid import grid_cell
+from pneunet.geometry.grids.body import body_grid
+from pneunet.geometry.parameters import Manipulator
 from pneunet.geometry.reference_cases import CASES
+from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.shape_slopes import ShapeSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
@@ -134,3 +139,24 @@ def test_quadrilaterals_tile_the_channel_s_wall(tmp_path):
 def test_a_block_of_hexahedra_bends_as_it_should():
     for row in flexure((1, 8), element=CellType.hexahedron):
         assert row.relative_error < 1e-3, row
+
+
+def test_a_body_of_hexahedra_is_held_without_force(tmp_path):
+    """Two segments of different width. At rest the frames are the body's and the cavity's volume is the
+    grid's; under pressure a closed cavity pushes at nothing, so that the clamp holds nothing."""
+    a = CASES["one_sided_w10"](60.0, 1)
+    body = Manipulator([a, replace(a, width=8.0, angle=110.0)])
+    grid = body_grid(body, 4.0)
+    filled = grid.mesh(air=True)
+    grid.mesh().write(tmp_path / "body.npz", {})
+    solve = ManipulatorSolve(body, tmp_path / "body.npz", MPI.COMM_SELF)
+    rest = solve.measure()
+    assert np.abs(rest.frames[:, :3, :3] - np.eye(3)).max() < 1e-9
+    assert rest.frames[:, 0, 3] == pytest.approx(rest.stations)
+    assert rest.volume == pytest.approx(filled.volumes()[filled.cell_tags == tags.AIR].sum())
+    solve.run(0.005, stability=False)
+    state = solve.measure()
+    force, moment = solve.problem.reaction(tags.BASE)
+    assert state.frames[-1, 2, 3] < -0.05  # it bends
+    assert np.abs(force).max() < 1e-6 and np.abs(moment).max() < 1e-5
+    solve.destroy()
