@@ -47,8 +47,8 @@ KEYS = (*quantities(Numbers), "kinds", "further", "mesh", "ranges", "edge_ranges
 @dataclass(frozen=True)
 class Mesh(Checked):
     """What meshes of cells are like: gmsh's tetrahedra, of edge_size at the body's edges, or grids of
-    hexahedra, with a layer of edge_size at planes where stresses are singular. every: n-th designs, from the first, are computed on it,
-    and further ones where it is 1.
+    hexahedra, with a layer of edge_size at planes where stresses are singular. every: n-th designs, from the
+    first, are computed on it, and further ones where it is 1.
 
     prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free
     states of designs that are not held out are differentiated by the shape.
