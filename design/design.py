@@ -124,6 +124,12 @@ class Design:
         return self._predicted(self.content.pressure)
 
     @cached_property
+    def further_predictions(self) -> tuple[Centreline, ...]:
+        """The Centrelines at the pressures of the target's further shapes, in their order."""
+        shapes = () if self.target is None else self.target.shapes
+        return tuple(self._predicted(s.pressures if len(s.pressures) > 1 else s.pressures[0]) for s in shapes)
+
+    @cached_property
     def errors(self) -> Errors | None:
         """How far the prediction is from the target; None without one."""
         return None if self.target is None else compare(self.prediction.points, self.target.curve)
@@ -215,9 +221,22 @@ class Design:
         the last accepted step of a run that was ended. Progress is shown line by line. InputError on bad
         input, ConvergenceError (with everything accepted on disk) where the pressure cannot be reached.
         """
-        from pneunet.design.chain import solve
+        from pneunet.design.chain import run_command
+        from pneunet.design.report.rundata import read_design_folder
 
-        return solve(self, directory, ranks, pressure_kPa, mesh_size_mm, fields, resume)
+        arguments = []
+        if pressure_kPa is not None:
+            in_MPa(pressure_kPa)  # before anything is written
+            arguments += ["--pressure-kPa", repr(float(pressure_kPa))]
+        if mesh_size_mm is not None:
+            arguments += ["--mesh-size-mm", repr(float(mesh_size_mm))]
+        arguments += ["--no-fields"] * (not fields) + ["--resume"] * resume
+        folder = self.save(directory)
+        run_command(["solve", str(folder / "design.toml"), *arguments], ranks)
+        found = read_design_folder(folder)
+        found.require_whole()
+        assert found.solve is not None, "a solve that ends well leaves its tables"
+        return found.solve
 
 
 def chosen_law(law: str | SegmentLaw) -> SegmentLaw:

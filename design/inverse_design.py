@@ -19,14 +19,13 @@ from pneunet.design.search.aims import OBJECTIVES, PAIRED
 from pneunet.design.search.doubts import WARN, WAYS, tell_doubts
 from pneunet.design.search.inverse import search
 from pneunet.design.search.tolerances import largest, tolerances
-from pneunet.design.target.extraction import Extracted, extract, rates
-from pneunet.design.target.segmentation import NOTE, split
+from pneunet.design.search.wanted import wanted
+from pneunet.design.target.extraction import Extracted, rates
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import PASSIVE, TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
 
-GIVEN_NOTE = "split given by the user"
 #: file key -> (word, unit) of a piece's rates
 RATES = {
     "tau_rad_per_mm": ("tau", "rad/mm"),
@@ -56,12 +55,15 @@ def inverse_design(
         if value not in known:
             raise InputError(f"{name} = '{value}' is not known: write {' or '.join(known)}")
     law, target = chosen_law(law), as_target(target)
-    pieces, note = (target.pieces, GIVEN_NOTE) if target.pieces else (split(target.curve), NOTE)
-    log.info(f"target {target.name}: {len(target.points)} points, {target.length:.2f} mm; {note}")
-    wanted = extract(target, pieces)
-    for i, piece in enumerate(wanted, start=1):
+    log.info(f"target {target.name}: {len(target.points)} points; {target.base_told}")
+    asked = wanted(target, law)
+    target = asked.target
+    log.info(f"{asked.note}: {len(asked.pieces)} pieces, {target.length:.2f} mm")
+    for i, piece in enumerate(asked.pieces, start=1):
         log.info(f"  piece {i}: {describe(piece)}")
-    found = search(target, wanted, law, objective)
+    for text in asked.notes:
+        log.info(f"  {text}")
+    found = search(target, asked.pieces, law, objective)
     best = found.best
     content = DesignFile(best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose)
     effort = {
@@ -74,7 +76,8 @@ def inverse_design(
     tell_doubts(design.doubts, law, outside)
     content.result.update(
         {
-            "split": note,
+            "split": asked.note,
+            "notes": list(asked.notes),
             "objective": objective,
             "law": law.name,
             "followed": design.followed,
@@ -86,7 +89,7 @@ def inverse_design(
             "alternative": [_table(c) for c in found.alternatives],
             "piece": [
                 {**piece.table(), "predicted": predicted(piece.kind, RodStrains(e, k))}
-                for piece, e, k in zip(wanted, design.strains.e, design.strains.k)
+                for piece, e, k in zip(asked.pieces, design.strains.e, design.strains.k)
             ],
         }
     )
@@ -130,9 +133,10 @@ def run_design(
 def describe(piece: Extracted) -> str:
     """One line about an `Extracted` piece, in the field's units."""
     table = piece.table()
+    rolled = f", rolled by {piece.roll:g} deg" * bool(piece.roll)
     told = [f"{name} {table[key]:.4g} {unit}" for key, (name, unit) in RATES.items() if key in table]
     note = f" ({piece.note})" if piece.note else ""
-    return f"{piece.kind:8s} {piece.length:6.1f} mm, {', '.join(told)}{note}"
+    return f"{piece.kind:8s} {piece.length:6.1f} mm, {', '.join(told)}{rolled}{note}"
 
 
 def predicted(kind: str, strains: RodStrains) -> dict[str, float]:
@@ -163,7 +167,7 @@ def summary(design: Design) -> Iterator[str]:
         yield from ("  " + text for text in design.errors.lines())
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
     if flush := design.content.result.get("flush_underside_costs_mm"):
-        yield f"flush undersides cost {flush:.2f} mm ([casting] steps = true allows steps)"
+        yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"
     if design.tolerances:
         yield "what moves it most: " + "; ".join(
             f"{'segment ' + str(e.segment) + ' ' if e.segment else ''}{e.name.rsplit('_', 1)[0]}"

@@ -285,7 +285,7 @@ def _held_near(problem, pressure):
 def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess: Guess) -> Problem:
     """The Problem at an entry of the lookup table, with the base turned to the target."""
     segments, n = guess.segments, len(pieces)
-    variables = variables_of(target, pieces, segments, not target.casting.steps)
+    variables = variables_of(target, pieces, segments, not target.casting.allow_steps)
     everyone = tuple(range(n))
     if target.pressure_range is None:
         variables.append(Variable("pressure", everyone, LEAST_PRESSURE, PRESSURE_LIMIT, 0.02))

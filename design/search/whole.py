@@ -19,8 +19,9 @@ TRIED, GOOD_ENOUGH = 3, 1.2
 MOST_COMBINATIONS = 4096
 #: rounded first, while all others are still free to make up for it
 FIRST = ("angle", "wall", "base_thickness", "roof")
-#: of steps on the way: hardly any, in the linearised problem
-DAMPING = 1e-8
+#: of the others' steps while variables are rounded one by one: with less they leave where the linearised
+#: problem is true
+DAMPING = 1e-3
 
 Found = tuple[Problem, Optimum[Evaluation]]
 

@@ -1,4 +1,4 @@
-"""A rod against points: misfit across the tangent, its slopes, Levenberg and Marquardt's steps, the criterion.
+"""A rod against points: misfit across the tangent, slopes, Levenberg and Marquardt's steps, the criterion.
 
 Every point has a foot on the rod. The feet slide along the tangent with each trial (variable projection), so
 that the misfit is the part of point minus foot across the tangent. Section frames, where given, count by what
@@ -13,14 +13,14 @@ from math import lgamma
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.design.segmentation.rod import Rod, Station
+from pneunet.design.segmentation.rod import PiecewiseRod, Station
 from pneunet.design.target.target import BENDING, HELICAL, PASSIVE
 from pneunet.geometry.parameters import TWISTING
 
-LEVER = 5.0  # mm, half a usual width: what turns of a section frame are measured at
+LEVER = 5.0  # mm, half a usual width, at which turns of a section frame are measured
 STRAIN = 0.03  # 1/mm, standard deviation of strains before any point is seen
-BEYOND = 2e-4  # 1/mm by which a strain leaves what can be reached that counts as one standard deviation
-TOO_SHORT = 0.5  # mm by which a piece is too short that counts as one
+#: mm by which a piece is too short that counts as one standard deviation: in the search, at its end
+SOFT, FIRM = 0.1, 0.01
 PIECE = 4.0  # price of a piece in the criterion, -2 log of its prior odds
 #: largest steps: rad, mm (start and joints), 1/mm
 CAPS = (0.5, 20.0, 0.02)
@@ -35,16 +35,24 @@ KINDS = {
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and, where given, frames (n, 3, 3)
-    and the section frame base (3, 3) at the start. shortest: length of a piece, mm. reach: {kind: (largest
-    |k1|, largest |k2|)} in 1/mm; a kind that is not named has no limits."""
+    """What a rod is fitted to: points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and,
+    where given, frames (n, 3, 3), the section frame base (3, 3) at the first point, weights (n,), 1 on
+    average.
+
+    length: of the curve, mm. lever: mm at which turns of frames are measured. shortest: length of a piece,
+    mm, which slack lets it miss. reach: {kind: (largest |k1|, largest |k2|)} in 1/mm; a kind that is not
+    named has no limits.
+    """
 
     points: np.ndarray
     noise: float
     length: float
     frames: np.ndarray | None = None
     base: np.ndarray | None = None
+    weights: np.ndarray | None = None
+    lever: float = LEVER
     shortest: float = 20.0
+    slack: float = SOFT
     reach: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -55,15 +63,16 @@ class Observations:
     @property
     def values(self) -> int:
         """How many numbers there are to be fitted."""
-        return len(self.points) * (2 if self.frames is None else 5)
+        count = len(self.points) if self.weights is None else int(np.sum(self.weights > 0))
+        return count * (2 if self.frames is None else 5)
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RodFit:
     """A rod with free strains (n, 2) and the feet's arc lengths (m,) of the points that it is fitted to."""
 
     data: Observations
-    rod: Rod
+    rod: PiecewiseRod
     free: np.ndarray
     feet: np.ndarray
 
@@ -80,11 +89,21 @@ class Fit:
 
     @cached_property
     def misfit(self) -> np.ndarray:
-        """(m, 2), with frames (m, 5), in mm."""
-        if self.data.frames is None:
-            return self.away[:, 1:]
-        turns = se3.log_rotation(np.swapaxes(self.station.frames, 1, 2) @ self.data.frames)
-        return np.hstack([self.away[:, 1:], LEVER * turns])
+        """(m, 2), with frames (m, 5), in mm, times the roots of weights."""
+        misfit = self.away[:, 1:]
+        if self.data.frames is not None:
+            turns = se3.log_rotation(np.swapaxes(self.station.frames, 1, 2) @ self.data.frames)
+            misfit = np.hstack([misfit, self.data.lever * turns])
+        return misfit if self.data.weights is None else misfit * self._roots[:, 1:]
+
+    @property
+    def _roots(self):
+        """(m, 3 or 6) of the points' weights; what is along the tangent has none."""
+        columns = 3 if self.data.frames is None else 6
+        assert self.data.weights is not None
+        roots = np.repeat(np.sqrt(self.data.weights)[:, None], columns, axis=1)
+        roots[:, 0] = 1.0
+        return roots
 
     @property
     def square(self) -> float:
@@ -97,21 +116,38 @@ class Fit:
         return float(np.sqrt(np.mean(np.sum(self.away[:, 1:] ** 2, axis=1))))
 
     @property
+    def left(self) -> int:
+        """Values less parameters, of which the rod's own sliding is none."""
+        return max(1, self.data.values - len(self.columns) + 1)
+
+    @property
     def noise(self) -> float:
-        """Standard deviation of a coordinate by what the parameters leave, mm."""
-        left = max(1, self.data.values - len(self.columns) + 1)
-        return float(np.sqrt(self.square / left))
+        """Standard deviation of a coordinate of a point by what the parameters leave, mm."""
+        share = self.data.values / self.left
+        return float(np.sqrt(np.mean(self.misfit[:, :2] ** 2) * share))
+
+    @property
+    def frame_noise(self) -> float:
+        """The same of the turns of section frames at the lever's length, mm; 0 without frames."""
+        if self.data.frames is None:
+            return 0.0
+        return float(np.sqrt(np.mean(self.misfit[:, 2:] ** 2) * self.data.values / self.left))
+
+    @property
+    def poor(self) -> float:
+        """By how many of its standard deviations the sum of squares exceeds what noise explains."""
+        return (self.square / self.data.noise**2 - self.left) / np.sqrt(2 * self.left)
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Indices of the parameters that are free, among all of `Rod.slopes`."""
+        """Indices of the parameters that are free, among all of `PiecewiseRod.slopes`."""
         fixed = 5 + len(self.free)
         return np.concatenate([np.arange(fixed), fixed + np.flatnonzero(self.free)])
 
     @cached_property
     def bounds(self) -> tuple[float, np.ndarray, np.ndarray]:
-        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of what is
-        penalised: strains out of reach, pieces that are too short."""
+        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of pieces
+        that are too short."""
         data, n = self.data, len(self.free)
         size, fixed = 5 + 3 * n, 5 + n
         gradient, curvature = np.zeros(size), np.zeros((size, size))
@@ -120,12 +156,6 @@ class Fit:
         gradient[fixed:] = -k.ravel() / STRAIN**2
         diagonal = np.einsum("ii->i", curvature)
         diagonal[fixed:] = self.free.ravel() / STRAIN**2
-        if data.reach:
-            most = np.array([data.reach.get(kind, (np.inf, np.inf)) for kind in self.kinds])
-            beyond = np.maximum(abs(k) - most, 0.0)
-            cost += float(np.sum(beyond**2)) / BEYOND**2
-            gradient[fixed:] -= (np.sign(k) * beyond).ravel() / BEYOND**2
-            diagonal[fixed:] += (beyond > 0).ravel() / BEYOND**2
         if n > 1:
             for i, length in enumerate(self.lengths):
                 lacking = data.shortest - length
@@ -133,9 +163,9 @@ class Fit:
                     row = np.zeros(size)
                     row[5 + i] = -1.0 if i > 0 else 0.0
                     row[6 + i] = 1.0 if i < n - 1 else 0.0
-                    cost += (lacking / TOO_SHORT) ** 2
-                    gradient += row * lacking / TOO_SHORT**2
-                    curvature += np.outer(row, row) / TOO_SHORT**2
+                    cost += (lacking / data.slack) ** 2
+                    gradient += row * lacking / data.slack**2
+                    curvature += np.outer(row, row) / data.slack**2
         return cost, gradient, curvature
 
     @property
@@ -148,32 +178,55 @@ class Fit:
         """(n,) of the pieces, from the first foot to the last one, mm."""
         return np.diff(np.concatenate([[self.feet.min()], self.rod.joints, [self.feet.max()]]))
 
+    @property
+    def most(self) -> np.ndarray | float:
+        """(n, 2) of the strains' largest magnitudes that can be reached."""
+        reach = self.data.reach
+        return np.array([reach.get(kind, (np.inf, np.inf)) for kind in self.kinds]) if reach else np.inf
+
+    @cached_property
+    def held(self) -> np.ndarray:
+        """Places, among the free parameters, of strains on the limit of their reach that the points would
+        move further."""
+        if not self.data.reach:
+            return np.zeros(0, int)
+        gradient = np.zeros(self.free.size)
+        gradient[np.flatnonzero(self.free)] = self.normal[1][5 + len(self.free) :]
+        strains = self.rod.strains
+        on = (abs(strains) >= self.most) & (gradient.reshape(strains.shape) * strains >= 0)
+        return 5 + len(self.free) + np.flatnonzero(on[self.free])
+
     @cached_property
     def cost(self) -> float:
         """What is minimised: squares over the noise's, prior and penalties."""
         cost = self.square / self.data.noise**2 + self.bounds[0]
         if self.data.base is not None:
-            cost += float(np.sum(self._base_turn**2)) * (LEVER / self.data.noise) ** 2
+            cost += float(np.sum(self._base_turn**2)) / self.data.noise**2
         return cost
 
-    @property
+    @cached_property
     def _base_turn(self):
-        return se3.log_rotation(self.rod.start[:3, :3].T @ self.data.base)
+        """By what the section frame at the first point misses the base, in mm at a lever's length."""
+        return self.data.lever * se3.log_rotation(self.station.frames[0].T @ self.data.base)
 
     @cached_property
     def slopes(self) -> np.ndarray:
         """(m, 1 + 2 or 5, p) of the feet along the tangent, then of what is fitted, by all parameters."""
         return self.slopes_of(self.rod, self.station)
 
-    def slopes_of(self, rod: Rod, station: Station) -> np.ndarray:
+    def slopes_of(self, rod: PiecewiseRod, station: Station) -> np.ndarray:
         """The same for a rod that is this one but for cuts."""
         moved, turned = rod.slopes(station)
-        if self.data.frames is None:
-            return moved
+        if self.data.frames is not None:
+            moved = np.concatenate([moved, self._turned(moved, turned, station, rod)], axis=1)
+        return moved if self.data.weights is None else moved * self._roots[:, :, None]
+
+    def _turned(self, moved, turned, station, rod):
+        """Slopes of the turns of section frames, whose feet slide as points move along, at a lever's
+        length."""
         k = np.zeros((len(station.s), 3))
         k[:, :2] = rod.strains[station.piece]
-        turned = LEVER * (turned - k[:, :, None] * moved[:, :1])
-        return np.concatenate([moved, turned], axis=1)
+        return self.data.lever * (turned - k[:, :, None] * moved[:, :1])
 
     @cached_property
     def normal(self) -> tuple[np.ndarray, np.ndarray]:
@@ -183,10 +236,10 @@ class Fit:
         curvature = weight * (rows.T @ rows)
         gradient = weight * (rows.T @ self.misfit.ravel())
         if self.data.base is not None:
-            turn = np.zeros((3, len(columns)))
-            turn[:, :3] = (LEVER / self.data.noise) * self.rod.start[:3, :3].T
-            curvature += turn.T @ turn
-            gradient += turn.T @ self._base_turn * (LEVER / self.data.noise)
+            station = self.rod.at(self.feet[:1])
+            turn = self._turned(*self.rod.slopes(station), station, self.rod)[0][:, columns]
+            curvature += weight * (turn.T @ turn)
+            gradient += weight * (turn.T @ self._base_turn)
         _, more_gradient, more_curvature = self.bounds
         curvature += more_curvature[np.ix_(columns, columns)]
         curvature += np.diag(self._vague)
@@ -219,7 +272,7 @@ class Fit:
         places = joints * self.data.joint_price - 2 * lgamma(joints + 1)
         return float(self.cost + size + strains + places)
 
-    def stepped(self, step: np.ndarray) -> "Fit":
+    def stepped(self, step: np.ndarray) -> "RodFit":
         """With the free parameters changed by `step` (q,) and the feet moved along."""
         n = len(self.free)
         full = np.zeros(5 + 3 * n)
@@ -227,13 +280,21 @@ class Fit:
         start = self.rod.start.copy()
         start[:3, :3] = se3.exp_rotation(full[:3]) @ start[:3, :3]
         start[:3, 3] += full[3:6]
-        rod = Rod(start, self.rod.joints + full[6 : 5 + n], self.rod.strains + full[5 + n :].reshape(n, 2))
+        strains = np.clip(self.rod.strains + full[5 + n :].reshape(n, 2), -self.most, self.most)
+        rod = PiecewiseRod(start, self.rod.joints + full[6 : 5 + n], strains)
         slide = self.away[:, 0] - self.slopes[:, 0, self.columns] @ step
-        return Fit(self.data, rod, self.free, self.feet + slide)
+        return RodFit(self.data, rod, self.free, self.feet + slide)
 
-    def settled(self) -> "Fit":
+    def within_reach(self) -> "RodFit":
+        """With strains that can be reached."""
+        if not self.data.reach:
+            return self
+        strains = np.clip(self.rod.strains, -self.most, self.most)
+        return RodFit(self.data, PiecewiseRod(self.rod.start, self.rod.joints, strains), self.free, self.feet)
+
+    def settled(self) -> "RodFit":
         """With the feet slid to where they belong."""
-        return Fit(self.data, self.rod, self.free, self.feet + self.away[:, 0])
+        return RodFit(self.data, self.rod, self.free, self.feet + self.away[:, 0])
 
 
 def capped(step: np.ndarray, joints: int) -> np.ndarray:
@@ -247,11 +308,16 @@ def capped(step: np.ndarray, joints: int) -> np.ndarray:
     return step / max(1.0, *sizes)
 
 
-def refined(fit: Fit, steps: int = 30, enough: float = 0.02) -> Fit:
+def refined(fit: RodFit, steps: int = 30, enough: float = 0.02) -> RodFit:
     """The local optimum, by Levenberg and Marquardt's steps until one gains less than `enough`."""
     damping = 1e-3
+    fit = fit.within_reach()
     for _ in range(steps):
         curvature, gradient = fit.normal
+        if len(fit.held):
+            curvature, gradient = curvature.copy(), gradient.copy()
+            curvature[fit.held], curvature[:, fit.held], gradient[fit.held] = 0.0, 0.0, 0.0
+            curvature[fit.held, fit.held] = 1.0
         diagonal = np.diag(curvature)
         while True:
             step = np.linalg.solve(curvature + np.diag(damping * diagonal), gradient)

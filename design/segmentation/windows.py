@@ -16,6 +16,7 @@ CELL = 8.0  # mm
 MOST_CELLS = 64
 FIRST_STEPS, STEPS = 5, 2  # of Gauss and Newton: of the first stretches, of grown ones
 SMOOTH = 10.0  # mm to either side that the first arc lengths are smoothed over
+LEAST_POINTS = 3  # of a stretch
 HOPELESS = 80.0  # by which a stretch's squares may exceed what noise explains, in units of its variance
 
 
@@ -26,9 +27,14 @@ def arc_lengths(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     growth of squared distances with the index instead.
     """
     n = len(points)
-    stride = max(1, min(8, n // 12))
-    near, far = (np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride))
-    spacing = np.sqrt(max(far - near, 1e-3 * far) / 3) / stride
+    spacing = 0.0
+    for stride in (1, 2, 4, 8):
+        if 2 * stride < n:
+            near, far = (
+                np.mean(np.sum((points[m:] - points[:-m]) ** 2, axis=1)) for m in (stride, 2 * stride)
+            )
+            # where the curve turns within a stride it seems too small
+            spacing = max(spacing, np.sqrt(max(far - near, 1e-3 * far) / 3) / stride)
     half = min(int(SMOOTH / spacing), (n - 1) // 2)
     if half < 2:
         smooth = points
@@ -61,8 +67,11 @@ class Stretch:
 
 
 class Stretches:
-    """All `Stretch`es of points (n, 3) at first arc lengths s (n,); noise: standard deviation, mm, or None for
-    what the shortest stretches say, at least `floor`."""
+    """All `Stretch`es, `found`, of points (n, 3) at first arc lengths s (n,), mm.
+
+    floor: least noise, mm. shortest: length of the first stretches, mm. noise: what these say, at least the
+    floor; estimate: without it.
+    """
 
     def __init__(
         self,
@@ -85,19 +94,19 @@ class Stretches:
         active = np.arange(count)
         for cells in range(least, count + 1):
             active = active[active + cells <= count]
-            active = active[self.index[active + cells] - self.index[active] >= 3]
+            some = self.index[active + cells] - self.index[active] >= LEAST_POINTS
+            fitted = active[some]
+            if not len(fitted):
+                continue
+            self._fit(fitted, cells, STEPS if self.found else FIRST_STEPS)
             if cells == least:
-                self._fit(active, cells, FIRST_STEPS)
                 self._estimate_noise(floor)
                 # once more, now that it is known how much of the torsion is noise
                 self.strains[:, 0] = 0.0
-                self._fit(active, cells, FIRST_STEPS)
-            elif len(active):
-                self._fit(active, cells, STEPS)
-            fits = [self.found[a, a + cells] for a in active]
+                self._fit(fitted, cells, FIRST_STEPS)
+            fits = [self.found[a, a + cells] for a in fitted]
             hopeful = [f.square < self.noise**2 * (f.left + HOPELESS) for f in fits]
-            if cells > least:
-                active = active[np.array(hopeful, bool)]
+            active = np.sort(np.concatenate([active[~some], fitted[np.array(hopeful, bool)]]))
 
     def _start(self, s, least):
         """First poses, at the middles of the first stretches, and strains from quadratics."""
@@ -122,12 +131,11 @@ class Stretches:
             up = -down / np.linalg.norm(down)
             self.turn[a] = np.column_stack([tangent, np.cross(up, tangent), up])
             if self.frames is not None:
-                self._from_frames(a, s, i, j)
+                self._from_frames(a, s, self.frames, i, j)
 
-    def _from_frames(self, a, s, i, j):
-        middle = (i + j) // 2
-        self.turn[a] = self.frames[middle]
-        turned = se3.log_rotation(self.frames[i].T @ self.frames[j - 1]) / max(s[j - 1] - s[i], 1e-9)
+    def _from_frames(self, a, s, frames, i, j):
+        self.turn[a] = frames[(i + j) // 2]
+        turned = se3.log_rotation(frames[i].T @ frames[j - 1]) / max(s[j - 1] - s[i], 1e-9)
         self.strains[a] = np.clip(turned[:2], -3 * STRAIN, 3 * STRAIN)
 
     def _fit(self, a, cells, steps):

@@ -6,14 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from pneunet.base.units import PER_MM_PER_M
-from pneunet.design.segmentation.fit import Fit, refined
+from pneunet.design.segmentation.fit import RodFit, refined
 from pneunet.design.target.target import PASSIVE, Piece, SplitOptions, Target
 from pneunet.geometry.parameters import TWISTING
 
 AT_LIMIT = 0.01  # of a limit: a strain so near sits on it
 NOTED = 4.0  # standard deviations of squares beyond which the points are said to lie off the rod
-CLOSED = 0.02  # of the length between the ends of a curve that is called closed
-FOLDED = 0.0  # cosine of the turn between chords beyond which a curve is called folded
 
 
 def thinned(points: int) -> str:
@@ -21,7 +19,7 @@ def thinned(points: int) -> str:
     return f"{points} points are more than the split needs: means of neighbouring ones are used"
 
 
-def told(fit: Fit, pieces: Sequence[Piece], target: Target, options: SplitOptions) -> Iterator[str]:
+def told(fit: RodFit, pieces: Sequence[Piece], target: Target, options: SplitOptions) -> Iterator[str]:
     """The notes of a final fit."""
     data, last = fit.data, len(pieces) - 1
     framed = data.frames is not None
@@ -42,21 +40,19 @@ def told(fit: Fit, pieces: Sequence[Piece], target: Target, options: SplitOption
                 " taken; half a turn more is the same curve with all that follows rolled by 180 deg"
             )
     yield from _limits(fit, pieces)
-    left = data.values - len(fit.columns)
-    if fit.square / data.noise**2 > left + NOTED * np.sqrt(2 * max(left, 1)):
+    if fit.poor > NOTED and not data.reach:
         worst = int(np.argmax(np.sum(fit.away[:, 1:] ** 2, axis=1)))
         away = float(np.linalg.norm(fit.away[worst, 1:]))
         yield (
-            f"the points lie {fit.rms:.3g} mm (root mean square) off the pieces, more than their noise explains"
+            f"the points lie {fit.rms:.3g} mm (root mean square) off the pieces, more than noise explains"
             f" ({data.noise:.2g} mm a coordinate), most at {fit.feet[worst] - fit.feet[0]:.0f} mm"
             f" ({away:.3g} mm): corners, or pieces shorter than {data.shortest:.3g} mm, are not followed"
         )
     if len(pieces) >= options.most_pieces:
         yield (
-            f"{len(pieces)} pieces are the most that are allowed: a larger tolerance_mm asks for fewer, a larger"
-            " most_pieces allows more"
+            f"{len(pieces)} pieces are the most that are allowed: a larger tolerance_mm asks for fewer, a"
+            " larger most_pieces allows more"
         )
-    yield from _shape(target.points)
 
 
 def _limits(fit, pieces):
@@ -71,16 +67,8 @@ def _limits(fit, pieces):
             if limit > 0 and value >= (1 - AT_LIMIT) * limit:
                 on.append(f"the {name} of piece {i} to {limit / PER_MM_PER_M:.3g} {unit}")
     if on:
-        free = refined(Fit(replace(fit.data, reach={}), fit.rod, fit.free, fit.feet))
+        free = refined(replace(fit, data=replace(fit.data, reach={})))
         yield (
             f"given up for what can be reached: {', '.join(on)}; RMS {fit.rms:.3g} mm instead of"
             f" {free.rms:.3g} mm"
         )
-
-
-def _shape(points):
-    """Curves that no straight-going body can be, in words."""
-    steps = np.diff(points, axis=0)
-    length = np.linalg.norm(steps, axis=1).sum()
-    if np.linalg.norm(points[-1] - points[0]) < CLOSED * length:
-        yield "the curve is closed: tip and base would be in the same place"

@@ -19,7 +19,15 @@ from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, TO_INTERNAL
 from pneunet.design.target.casting import RANGES, Casting
 from pneunet.design.target.shapes import TargetShape, TipPoints, guide_to
 from pneunet.design.target.table import PointsTable, read_points
-from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Piece, SplitOptions, Target
+from pneunet.design.target.target import (
+    BENDING,
+    HELICAL,
+    PASSIVE,
+    PRESSURE_LIMIT,
+    Piece,
+    SplitOptions,
+    Target,
+)
 from pneunet.design.target.wrapfile import wrapped
 from pneunet.geometry.parameters import TWISTING, Segment
 
@@ -65,7 +73,7 @@ CURVES = ("points", "points_mm", "wrap")
 SHAPE_KEYS = (*CURVES, "frames", "weights", "pressure_kPa")
 KEYS = (
     *("name", "target", *SHAPE_KEYS, "pressure_range_kPa", "gravity_m_per_s2", "shape", "tip_points"),
-    *("piece", "base", "material", "casting", "segment", "vary"),
+    *("piece", "base", "material", "casting", "segment", "split", "vary"),
 )
 
 

@@ -16,7 +16,8 @@ from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
 from pneunet.design.target.shapes import TargetShape, TipPoints, checked_pressures
 from pneunet.geometry.loading import DeadLoads
 
-#: kinds of pieces beside TWISTING, which is straight and turns about itself; PASSIVE: straight, no twist wanted
+#: kinds of pieces beside TWISTING, which is straight and turns about itself; PASSIVE: straight, with no twist
+#: wanted
 BENDING, HELICAL, PASSIVE = "bending", "helical", "passive"
 LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
 
@@ -39,13 +40,14 @@ class Piece:
 
 @dataclass(frozen=True)
 class SplitOptions(Checked):
-    """How a curve without given pieces is split."""
+    """How a curve is split where no pieces are given, and whether given ones are refined."""
 
     tolerance: float | None = quantity(
         "mm", None, "noise to be assumed at least; default 0.0002 of the length", above=0, high=100
     )
     most_pieces: int = quantity(None, 8, "pieces at most", low=1, high=20)
     shortest: float = quantity("mm", 20.0, "length of the shortest piece", low=1, high=1000)
+    refine: bool = quantity(None, False, "whether the places and rates of given pieces are refined")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +61,9 @@ class Target:
     coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of several groups of
     segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip: `TipPoints` as the
     pressure rises; material; casting: what can be cast; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice; split: how it is split without pieces; source: name of the file that it was read from."""
+    Segment: (low, high)} or None for the default choice; split: how it is split; source: name of the file
+    that it was read from.
+    """
 
     points: np.ndarray
     name: str = "target"

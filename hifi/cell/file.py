@@ -11,6 +11,7 @@ from pneunet.base.materials.laws import material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.designfile import segment_from_table, segment_table
+from pneunet.geometry.meshfile import ELEMENTS
 from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.contact.medium import ThirdMedium
 from pneunet.hifi.contact.penalty import WallPenalty
@@ -43,7 +44,9 @@ class CellCase(Checked):
     control: 'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor`
     times the volume at rest. contact: 'auto': walls that touch are held apart by the `penalty`;
     'third-medium': by the `medium` in the gap; 'none': they pass through each other. graded: elements shrink
-    to mesh_size * EDGE at the body's edges, where stresses are singular.
+    to mesh_size * EDGE at the body's edges, where stresses are singular; of hexahedra there is one layer of
+    this thickness on each side of the planes in which those edges lie. element: tetrahedra of gmsh's, or
+    hexahedra of a sheared grid.
     """
 
     segment: Segment
@@ -57,6 +60,7 @@ class CellCase(Checked):
     penalty: WallPenalty = WallPenalty()
     medium: ThirdMedium = ThirdMedium()
     graded: bool = quantity(None, False)
+    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
 
     def __post_init__(self) -> None:
         super().__post_init__()

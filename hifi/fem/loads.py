@@ -1,5 +1,7 @@
 """Loads: each is an object with its residual; what a path sets are its `value`."""
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -10,7 +12,7 @@ from pneunet.hifi.fem.mixed_field import MixedField
 from pneunet.hifi.fem.surface import FaceQuadrature
 
 
-class AppliedLoad:
+class AppliedLoad(ABC):
     """`value` times what the load is.
 
     has_tangent: whether its residual's derivative belongs to the tangent; closed: whether that is symmetric.
@@ -25,11 +27,11 @@ class AppliedLoad:
         v, _ = ufl.split(field.test)
         return [self.value * part for part in self.parts(field, v)]
 
+    @abstractmethod
     def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
         """Residual at value = 1, tested with the displacement v."""
-        raise NotImplementedError
 
-    def update(self, field: MixedField) -> None:
+    def update(self, field: MixedField) -> None:  # noqa: B027, most have nothing to do
         """Told before the residual is assembled."""
 
 
