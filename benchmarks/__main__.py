@@ -26,10 +26,12 @@ from benchmarks import (
     people,
     remeshed,
     rod,
+    segmentation,
     segments,
     silicones,
     speed,
     verification,
+    workspace,
 )
 from benchmarks.tables import table
 from pneunet.base.files.atomic import write_text
@@ -74,9 +76,14 @@ PARTS = {
             " some seconds"
         ),
     ),
+    "workspace": (workspace.hundred_thousand, "100,000 shapes of one to three segments; some seconds"),
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
+    ),
+    "segmentation": (
+        segmentation.segmentation,
+        "the split of 200 random targets against the pieces that they are made of; some 30 seconds",
     ),
     "people": (people.people, "files as people bring them against the right answer of each; some minutes"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),

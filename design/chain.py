@@ -20,8 +20,6 @@ from pneunet.base.files.folder import output_folder
 from pneunet.base.files.results import Results, read_run
 from pneunet.base.files.toml import toml_text
 from pneunet.base.units import in_MPa
-from pneunet.design.design import Design
-from pneunet.design.report.rundata import Solution, read_design_folder
 from pneunet.geometry.parameters import Segment
 from pneunet.reduced.choice import choose_law
 
@@ -59,32 +57,6 @@ def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
         raise ConvergenceError(text) if "stopped at" in text else InputError(text)
     if code != DONE:
         raise RuntimeError(f"pneunet {' '.join(arguments)} ended with exit code {code}: {why[-2000:]}")
-
-
-def solve(
-    design: Design,
-    directory: str | Path,
-    ranks: int = 1,
-    pressure_kPa: float | None = None,
-    mesh_size_mm: float | None = None,
-    fields: bool = True,
-    resume: bool = False,
-) -> Solution:
-    """Design.solve."""
-    arguments = []
-    if pressure_kPa is not None:
-        in_MPa(pressure_kPa)  # before anything is written
-        arguments += ["--pressure-kPa", repr(float(pressure_kPa))]
-    if mesh_size_mm is not None:
-        arguments += ["--mesh-size-mm", repr(float(mesh_size_mm))]
-    arguments += ["--no-fields"] * (not fields) + ["--resume"] * resume
-    folder = design.save(directory)
-    run_command(["solve", str(folder / "design.toml"), *arguments], ranks)
-    found = read_design_folder(folder)
-    found.require_whole()
-    solution = found.solve
-    assert solution is not None, "a solve that ends well leaves its tables"
-    return solution
 
 
 def solve_cell(

@@ -16,7 +16,7 @@ from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
-from pneunet.base.units import KPA_PER_MPA, in_MPa
+from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
@@ -25,12 +25,14 @@ from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.overlap import overlap_doubts
-from pneunet.reduced.rod.prediction import doubts, predict
+from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pneunet.design.report.rundata import Solution
+    from pneunet.design.search.inverse import Candidate
+    from pneunet.design.search.tolerances import Tolerances
 
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
@@ -42,29 +44,33 @@ class Design:
     """What to cast, and at what pressure.
 
     content: what design.toml says. law: what predicts. target: what was wanted, if anything was.
-    active_bounds, widened_ranges: of the search, in words. effort: what run.json says of the search.
+    active_bounds: of the search, in words. effort: what run.json says of the search. Of a fresh search alone,
+    tolerances: what small changes do to the shape; alternatives: distinct bodies that do nearly as well;
+    stopped_by: the bound that costs most, in words.
     """
 
     content: DesignFile
     law: SegmentLaw = field(default_factory=choose_law)
     target: Target | None = None
     active_bounds: tuple[str, ...] = ()
-    widened_ranges: tuple[str, ...] = ()
     effort: dict = field(default_factory=dict)
+    tolerances: "Tolerances | None" = None
+    alternatives: "tuple[Candidate, ...]" = ()
+    stopped_by: str = ""
 
     @classmethod
     def of(
         cls,
         manipulator: Manipulator,
         *,
-        pressure_kPa: float,
+        pressure_kPa: float | Iterable[float],
         name: str = "design",
         law: str | SegmentLaw = "trained",
         mesh_size_mm: float = 2.0,
     ) -> "Design":
-        """A Manipulator made by hand at a pressure. law: 'trained', 'analytic', a law's file (.npz) or a
-        SegmentLaw. InputError where pressure or mesh size is none."""
-        content = DesignFile(manipulator, in_MPa(pressure_kPa), name=name, mesh_size=mesh_size_mm)
+        """A Manipulator made by hand at a pressure, or at one for each group of its segments. law: 'trained',
+        'analytic', a law's file (.npz) or a SegmentLaw. InputError where pressure or mesh size is none."""
+        content = DesignFile(manipulator, each_in_MPa(pressure_kPa), name=name, mesh_size=mesh_size_mm)
         return cls(content, chosen_law(law))
 
     @classmethod
@@ -86,7 +92,6 @@ class Design:
             chosen_law(folder.law if law is None else law),
             None if folder.target is None else Target(folder.target, content.name),
             tuple(told.get("active_bounds", ())),
-            tuple(told.get("grown_ranges", ())),
             {key: folder.record[key] for key in EFFORT if key in folder.record},
         )
 
@@ -99,19 +104,30 @@ class Design:
         return f"<Design {self.content.name}: {told}{f'; {len(self.doubts)} doubts' * ('doubts' in known)}>"
 
     @property
+    def followed(self) -> bool:
+        """Whether the prediction follows all of the target; true without one."""
+        return self.errors is None or not self.errors.not_followed
+
+    @property
     def manipulator(self) -> Manipulator:
         """What is cast."""
         return self.content.manipulator
 
     @property
     def pressure_kPa(self) -> float:
-        """The design's pressure."""
-        return self.content.pressure * KPA_PER_MPA
+        """The design's pressure, of several groups of segments the largest."""
+        return self.content.largest_pressure * KPA_PER_MPA
 
     @cached_property
     def prediction(self) -> Centreline:
         """The Centreline at the design's pressure, in the target's coordinates."""
         return self._predicted(self.content.pressure)
+
+    @cached_property
+    def further_predictions(self) -> tuple[Centreline, ...]:
+        """The Centrelines at the pressures of the target's further shapes, in their order."""
+        shapes = () if self.target is None else self.target.shapes
+        return tuple(self._predicted(s.pressures if len(s.pressures) > 1 else s.pressures[0]) for s in shapes)
 
     @cached_property
     def errors(self) -> Errors | None:
@@ -121,28 +137,36 @@ class Design:
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """Reasons, one a line, not to trust the prediction at the design's pressure."""
-        of_the_law = doubts(self.manipulator, self.content.pressure, self.law)
+        of_the_law = doubts(self.manipulator, [self.content.pressure], self.law)
         return of_the_law + overlap_doubts(self.manipulator, self.prediction)
 
     @cached_property
     def strains(self) -> RodStrains:
-        """RodStrains (segments, 3) of the segments' active parts at the design's pressure."""
-        return self.law.each(self.manipulator.segments, self.content.pressure)
+        """RodStrains (segments, 3) of the segments' active parts at the design's pressure, in the body's
+        axes."""
+        return segment_strains(self.manipulator, self.content.pressure, self.law)
 
     @overload
     def predict(self, pressures_kPa: float) -> Centreline: ...
 
     @overload
-    def predict(self, pressures_kPa: Iterable[float]) -> list[Centreline]: ...
+    def predict(self, pressures_kPa: Iterable[float | Iterable[float]]) -> list[Centreline]: ...
 
-    def predict(self, pressures_kPa: float | Iterable[float]) -> Centreline | list[Centreline]:
+    def predict(
+        self, pressures_kPa: float | Iterable[float | Iterable[float]]
+    ) -> Centreline | list[Centreline]:
         """The Centreline at a pressure, or a list of them at several, in the target's coordinates.
 
-        InputError for a pressure that is none, ConvergenceError where the law has no equilibrium.
+        Of a body with several groups of segments a number is the largest pressure, the others in the design's
+        proportions; in a list there may be tuples of one for each group. InputError for a pressure that is
+        none, ConvergenceError where the law has no equilibrium.
         """
-        if isinstance(pressures_kPa, Iterable):
-            return [self.predict(p) for p in pressures_kPa]
-        return self._predicted(in_MPa(pressures_kPa))
+        if not isinstance(pressures_kPa, Iterable):
+            return self._predicted(self.content.scaled(in_MPa(pressures_kPa)))
+        return [
+            self._predicted(each_in_MPa(p)) if isinstance(p, Iterable) else self.predict(p)
+            for p in pressures_kPa
+        ]
 
     def _predicted(self, pressure):
         return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)
@@ -197,9 +221,22 @@ class Design:
         the last accepted step of a run that was ended. Progress is shown line by line. InputError on bad
         input, ConvergenceError (with everything accepted on disk) where the pressure cannot be reached.
         """
-        from pneunet.design.chain import solve
+        from pneunet.design.chain import run_command
+        from pneunet.design.report.rundata import read_design_folder
 
-        return solve(self, directory, ranks, pressure_kPa, mesh_size_mm, fields, resume)
+        arguments = []
+        if pressure_kPa is not None:
+            in_MPa(pressure_kPa)  # before anything is written
+            arguments += ["--pressure-kPa", repr(float(pressure_kPa))]
+        if mesh_size_mm is not None:
+            arguments += ["--mesh-size-mm", repr(float(mesh_size_mm))]
+        arguments += ["--no-fields"] * (not fields) + ["--resume"] * resume
+        folder = self.save(directory)
+        run_command(["solve", str(folder / "design.toml"), *arguments], ranks)
+        found = read_design_folder(folder)
+        found.require_whole()
+        assert found.solve is not None, "a solve that ends well leaves its tables"
+        return found.solve
 
 
 def chosen_law(law: str | SegmentLaw) -> SegmentLaw:

@@ -1,4 +1,5 @@
-"""Regenerate design/data/*.csv from their numbers: `python -m examples.make_targets [FOLDER]`.
+"""Regenerate design/data/*.csv from their numbers, and the profiles of vase and pear in examples/wraps:
+`python -m examples.make_targets [FOLDER [FOLDER]]`.
 
 octopus and tentacle2 are rods of piecewise uniform twist and curvature (per *deformed* length); octopus is
 the paper's (Jiang et al. 2021, Sec. IV D). vase and pear are wraps of a surface of revolution, for which the
@@ -12,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.base.files.atomic import write_text
+from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.strains import helix_frenet
+from pneunet.design.target.wrap import POINTS, Revolution, WrapPath, wrap
 
-POINTS = 201
-#: points on a wrap before it is sampled evenly; its chords then miss arc length by less than 1e-6 mm
-DENSE = 20001
+#: mm between the rows of a profile: a cubic spline through them then meets the shipped wraps to 1e-6 mm
+PROFILE_STEP = 0.5
 
 
 def rod(pieces):
@@ -38,22 +39,6 @@ def rod(pieces):
     return motions[:, :3, 3]
 
 
-def wrap(radius, slope, z_from, z_to, turns, offset=6.0):
-    """Points (201, 3) of a curve around the surface r(z), `offset` mm outside it along the normal, z linear
-    in angle.
-
-    The offset is half the manipulator's width: the body then lies on the surface.
-    """
-    t = np.linspace(0, 1, DENSE)
-    z, angle = z_from + (z_to - z_from) * t, 2 * np.pi * turns * t
-    normal = np.hypot(1, slope(z))
-    r = radius(z) + offset / normal
-    curve = np.column_stack([r * np.cos(angle), r * np.sin(angle), z - offset * slope(z) / normal])
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    even = np.linspace(0, s[-1], POINTS)
-    return np.column_stack([np.interp(even, s, column) for column in curve.T])
-
-
 def octopus():
     """0.01 pi rad/mm over 50 mm; 18 1/m over 30 mm; helix of cylinder curvature 70 1/m, pitch 90 mm over 100
     mm."""
@@ -66,15 +51,35 @@ def tentacle2():
     return rod([(60, 0.020, 0), (70, -0.025, 0.025), (70, 0.020, 0.030)])
 
 
+def vase_radius(z):
+    return 28 + 7 * ((z - 50) / 50) ** 2
+
+
+def pear_radius(z):
+    return 34 * np.sqrt(1 - ((z - 36) / 60) ** 2)
+
+
+#: name -> (radius of the surface, its slope, top, path): the offset is half the manipulator's width, so that
+#: the body lies on the surface
+WRAPS = {
+    "vase": (vase_radius, lambda z: 14 * (z - 50) / 2500, 100, WrapPath(6.0, 0.9, z_range=(15, 85))),
+    "pear": (
+        pear_radius,
+        lambda z: -(34**2) * (z - 36) / 3600 / pear_radius(z),
+        80,
+        WrapPath(6.0, 0.8, z_range=(15, 70)),
+    ),
+}
+
+
 def vase():
-    return wrap(lambda z: 28 + 7 * ((z - 50) / 50) ** 2, lambda z: 14 * (z - 50) / 2500, 15, 85, 0.9)
+    radius, slope, _, path = WRAPS["vase"]
+    return wrap(Revolution(radius, slope), path)
 
 
 def pear():
-    def radius(z):
-        return 34 * np.sqrt(1 - ((z - 36) / 60) ** 2)
-
-    return wrap(radius, lambda z: -(34**2) * (z - 36) / 3600 / radius(z), 15, 70, 0.8)
+    radius, slope, _, path = WRAPS["pear"]
+    return wrap(Revolution(radius, slope), path)
 
 
 TARGETS = {"octopus": octopus, "tentacle2": tentacle2, "vase": vase, "pear": pear}
@@ -85,9 +90,12 @@ def csv_text(points):
     return "x_mm,y_mm,z_mm\n" + "".join(f"{x:.4f},{y:.4f},{z:.4f}\n" for x, y, z in rows)
 
 
-def main(folder=Path(__file__).parent / "targets"):
+def main(folder=Path(__file__).parents[1] / "design" / "data", profiles=Path(__file__).parent / "wraps"):
     for name, points in TARGETS.items():
         write_text(Path(folder) / f"{name}.csv", csv_text(points()))
+    for name, (radius, _, top, _) in WRAPS.items():
+        z = np.arange(0, top + PROFILE_STEP / 2, PROFILE_STEP)
+        write_csv(Path(profiles) / f"{name}_profile.csv", ("r_mm", "z_mm"), np.column_stack([radius(z), z]))
 
 
 if __name__ == "__main__":

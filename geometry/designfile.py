@@ -1,6 +1,7 @@
 """design.toml: a manipulator, its pressure and where its base stands, complete and re-runnable."""
 
 from dataclasses import dataclass, field
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,11 @@ from pneunet.base.files.toml import (
     toml_text,
 )
 from pneunet.base.materials.laws import Hyperelastic, material_from_table, material_to_table
-from pneunet.base.quantities import Checked, quantities, quantity
-from pneunet.base.units import LARGEST_PRESSURE_KPA
+from pneunet.base.quantities import Checked, quantities, quantity, rounded, shown
+from pneunet.base.units import KPA_PER_MPA, LARGEST_PRESSURE_KPA
 from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_control
-from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.meshfile import ELEMENTS
+from pneunet.geometry.parameters import NO_CHAMBERS, OF_CHAMBERS, PASSIVE, PLAIN, Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
 #: coordinates of a base, mm: at a kilometre a rounding is still far below a tolerance
@@ -31,18 +33,19 @@ FARTHEST = 1e6
 class DesignFile(Checked):
     """What the commands mesh, shape and solve read.
 
-    pressure in MPa; base_pose (4, 4): the base frame in the target's coordinates (mm); mesh_size in mm;
-    target: text that names the target file; result: free table of numbers that `pneunet design` adds and
-    nobody reads back. loads, control, measure and contact ('auto': walls of neighbouring chambers that touch
-    are held apart; 'none': they are not) are for the finite elements alone; a pressure of 0 goes with loads
-    only.
+    pressure in MPa: one for all, or a tuple of one for each group of segments; base_pose (4, 4): the base
+    frame in the target's coordinates (mm); mesh_size in mm; element: tetrahedra of gmsh's or hexahedra of a
+    grid; target: text that names the target file; result: free table of numbers that `pneunet design` adds and nobody reads back. loads, control, measure and
+    contact ('auto': walls of neighbouring chambers that touch are held apart; 'none': they are not) are for
+    the finite elements alone; a pressure of 0 everywhere goes with loads only.
     """
 
     manipulator: Manipulator
-    pressure: float = quantity("kPa", low=0, high=LARGEST_PRESSURE_KPA)
+    pressure: float | tuple[float, ...] = quantity("kPa")
     name: str = quantity(None, "design")
     base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
     mesh_size: float = quantity("mm", 2.0, low=0.1, high=20)
+    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
     target: str = quantity(None, "")
     result: dict = field(default_factory=dict)
     loads: DeadLoads = DeadLoads()
@@ -52,8 +55,33 @@ class DesignFile(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.pressure == 0 and not self.loads:
+        each = self.pressure if isinstance(self.pressure, tuple) else (self.pressure,)
+        object.__setattr__(self, "pressure", each[0] if len(each) == 1 else each)
+        for pressure in each:
+            known = isinstance(pressure, Real)
+            if not known or not 0 <= rounded(pressure * KPA_PER_MPA) <= LARGEST_PRESSURE_KPA:
+                told = f"{pressure * KPA_PER_MPA:g}" if known else shown(pressure)
+                raise InputError(f"pressure_kPa = {told} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
+        self.manipulator.pressures(self.pressure)
+        if self.largest_pressure == 0 and not self.loads:
             raise InputError("pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads]")
+
+    @property
+    def largest_pressure(self) -> float:
+        """That of the group with the largest, MPa: what "the pressure" of a body with several means."""
+        return float(np.max(self.pressure))
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """(groups,) each pressure over the largest; all 1 where all are 0."""
+        each, largest = np.broadcast_to(self.pressure, len(self.manipulator.groups)), self.largest_pressure
+        return tuple((each / largest).tolist()) if largest else (1.0,) * len(each)
+
+    def scaled(self, largest: float) -> float | tuple[float, ...]:
+        """The pressures in the same proportions, the largest of them `largest` (MPa)."""
+        if not isinstance(self.pressure, tuple):
+            return largest
+        return tuple(largest * share for share in self.shares)
 
 
 TABLES = ("material", "layer_material", "segment", "base", "result", "loads", "measure")
@@ -104,6 +132,11 @@ def segment_from_table(
     """The Segment in a TOML table, its materials the ones given unless it has its own."""
     row = as_table(row, where)
     refuse_unknown(row, [*quantities(Segment), "material", "layer_material"], where)
+    if row.get("kind") == PASSIVE:
+        of_chambers = [key for key in OF_CHAMBERS if key in row]
+        if of_chambers:
+            raise InputError(f"{where}: {', '.join(of_chambers)}: {NO_CHAMBERS}")
+        row |= {"angle_deg": PLAIN["angle"], "chambers": PLAIN["chambers"]}
     own = row.pop("material", None)
     if own is not None:
         material = material_from_table(own, f"{where} material")
@@ -152,11 +185,20 @@ def body_tables(manipulator: Manipulator) -> list[dict]:
     """What a solution belongs to: every dimension and material of every segment, in file units."""
     rows = []
     for segment in manipulator.segments:
-        row = to_table(segment) | {"material": material_to_table(segment.material)}
+        row = segment_table(segment) | {"material": material_to_table(segment.material)}
         if segment.layer_material is not None:
             row["layer_material"] = material_to_table(segment.layer_material)
         rows.append(row)
     return rows
+
+
+def segment_table(segment: Segment) -> dict:
+    """Every dimension of a segment that counts, in file units; no material. What is as it is for most, no
+    roll and the first group, is not written."""
+    table = to_table(segment)
+    drop = OF_CHAMBERS if segment.kind == PASSIVE else ("plain_length_mm",)
+    usual = {"roll_deg": 0, "pressure_group": 1}
+    return {k: v for k, v in table.items() if k not in drop and usual.get(k) != v}
 
 
 def write_design_file(path: str | Path, design: DesignFile) -> None:

@@ -16,6 +16,8 @@ SHAPE = (
     *("base_thickness", "roof", "channel_width", "channel_height", "cavity_floor"),
 )
 _dimensions = attrgetter(*SHAPE)
+#: (13,) derivatives of the normal pitch by them
+PITCH_BY = np.array([{"cavity_thickness": 1.0, "wall": 2.0, "gap": 1.0}.get(name, 0.0) for name in SHAPE])
 #: kind -> name -> changes of SHAPE by one: the directions in which designs differ when the normal pitch is
 #: the unit of length. Walls and cavities grow at the gap's cost; what a campaign ties together
 #: (hifi.runs.campaign.sample) moves together
@@ -73,6 +75,15 @@ def shapes_of(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
     shape, pitch = np.array([_dimensions(s) for s in segments]), np.array([normal_pitch(s) for s in segments])
     shape[:, 1:] /= pitch[:, None]
     return shape, pitch
+
+
+def by_dimensions(slopes: np.ndarray, shape: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """(n, p, 13) derivatives by SHAPE's dimensions (degrees, mm) of what has the derivatives (n, p, 13) by
+    the shape numbers (n, 13), at normal pitches (n,)."""
+    scaled = (slopes[:, :, 1:] @ shape[:, 1:, None])[:, :, 0]
+    by = slopes - scaled[:, :, None] * PITCH_BY
+    by[:, :, 1:] /= pitch[:, None, None]
+    return by
 
 
 def segment_of(kind: str, shape: np.ndarray, pitch: float, material: Hyperelastic) -> Segment:

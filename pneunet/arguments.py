@@ -149,6 +149,12 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_outside(a)
     add_output(a, "the design's folder")
 
+    a = add("workspace", "what segments reach over angle and pressure, and where tips of one to three go")
+    text = "what is varied; default: the paper's silicone and a design's start dimensions"
+    a("workspace", type=path, nargs="?", metavar="WORKSPACE.toml", help=text)
+    add_law(a, "trained")
+    add_output(a, "out/NAME of the file, out/workspace without one")
+
     a = add("mesh", "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
     a("design", type=path)
     a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")

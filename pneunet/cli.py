@@ -1,7 +1,8 @@
 """The command line: each command is one call of a function that Python has too.
 
-Exit codes: 0 done; 2 bad input, a load that could not be reached or too little memory; 130 interrupted (each
-with one line on standard error, under MPI from one rank); anything else is a bug and shows its traceback.
+Exit codes: 0 done; 3 done, but a design does not follow its target; 2 bad input, a load that could not be
+reached or too little memory; 130 interrupted (each with one line on standard error, under MPI from one rank);
+anything else is a bug and shows its traceback.
 """
 
 import errno
@@ -20,14 +21,18 @@ from pneunet.base.system.libraries import told_what_to_install
 from pneunet.base.system.log import complain, show_on_screen
 from pneunet.base.units import MPA_PER_KPA
 
+#: exit code of a design that is written, but does not follow its target
+NOT_FOLLOWED = 3
 log = logging.getLogger(__name__)
 
 
-def design(a: Namespace) -> None:
+def design(a: Namespace) -> int:
     from pneunet.design.inverse_design import run_design
     from pneunet.reduced.choice import choose_law
 
-    run_design(a.target, a.output or Path("out") / a.target.stem, choose_law(a.law), outside=a.outside)
+    folder = a.output or Path("out") / a.target.stem
+    found = run_design(a.target, folder, choose_law(a.law), outside=a.outside)
+    return 0 if found.followed else NOT_FOLLOWED
 
 
 def shape(a: Namespace) -> None:
@@ -92,6 +97,16 @@ def train(a: Namespace) -> None:
             run_training(a.data, out, not a.no_comparison, mapping, a.like)
 
 
+def workspace(a: Namespace) -> None:
+    from pneunet.design.workspace import run_workspace
+    from pneunet.reduced.choice import choose_law
+
+    with rank_map() as mapping:
+        if mapping:  # other ranks have worked for this one
+            name = a.workspace.stem if a.workspace else "workspace"
+            run_workspace(a.workspace, a.output or Path("out") / name, choose_law(a.law), mapping)
+
+
 def report(a: Namespace) -> None:
     from pneunet.front import report as write
 
@@ -119,6 +134,7 @@ def doctor(a: Namespace) -> int:
 COMMANDS = {
     "design": design,
     "shape": shape,
+    "workspace": workspace,
     "mesh": mesh,
     "solve": solve,
     "cell": cell,

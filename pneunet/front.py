@@ -8,7 +8,7 @@ import numpy as np
 
 from pneunet.base.files.toml import from_table
 from pneunet.base.materials.laws import Hyperelastic, material_from_table
-from pneunet.base.units import in_MPa
+from pneunet.base.units import each_in_MPa
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.report import write_report
 from pneunet.design.search.doubts import WARN, tell_doubts
@@ -53,18 +53,19 @@ def read_design(path: str | Path, law: str | SegmentLaw | None = None) -> Design
 def predict(
     manipulator: Manipulator,
     *,
-    pressure_kPa: float,
+    pressure_kPa: float | Iterable[float],
     law: str | SegmentLaw = "trained",
     base_pose: np.ndarray | None = None,
 ) -> Centreline:
     """The Centreline (mm) of a free Manipulator at a pressure; base_pose (4, 4): frame of its base.
 
-    law: 'trained', 'analytic', a law's file (.npz) or a SegmentLaw. InputError for a pressure that is none,
-    ConvergenceError where the law has no equilibrium. What makes the law doubt its answer is logged.
+    pressure_kPa: one for all, or one for each group of segments. law: 'trained', 'analytic', a law's file
+    (.npz) or a SegmentLaw. InputError where a pressure or their number is wrong, ConvergenceError where the
+    law has no equilibrium. What makes the law doubt its answer is logged.
     """
-    law, pressure = chosen_law(law), in_MPa(pressure_kPa)
+    law, pressure = chosen_law(law), each_in_MPa(pressure_kPa)
     line = prediction.predict(manipulator, pressure, law, base_pose=base_pose)
-    tell_doubts(prediction.doubts(manipulator, pressure, law), law, WARN)
+    tell_doubts(prediction.doubts(manipulator, [pressure], law), law, WARN)
     return line
 
 
@@ -78,11 +79,10 @@ def rod(
     """The Rod of a Manipulator, which carries loads: rod(...).equilibrium(pn.loads(tip_force_N=[0, 0,
     -0.1])).
 
-    pressure_kPa: one for all segments, or one for each. InputError where a pressure or their number is wrong.
+    pressure_kPa: one for all, or one for each group of segments. InputError where a pressure or their number
+    is wrong.
     """
-    if isinstance(pressure_kPa, Iterable):
-        return Rod.of(manipulator, chosen_law(law), [in_MPa(p) for p in pressure_kPa], base_pose)
-    return Rod.of(manipulator, chosen_law(law), in_MPa(pressure_kPa), base_pose)
+    return Rod.of(manipulator, chosen_law(law), each_in_MPa(pressure_kPa), base_pose)
 
 
 def report(directory: str | Path, law: str | SegmentLaw | None = None) -> Path:

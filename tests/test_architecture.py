@@ -24,7 +24,7 @@ FLOORS = {
 #: what lies in the package itself
 ROOMS = {
     "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
-    "geometry": [{""}, {"cad"}],
+    "geometry": [{""}, {"grids"}, {"cad"}],
     "hifi": [
         {"fem"},
         {"path"},
@@ -36,7 +36,7 @@ ROOMS = {
         {"verification"},
     ],
     "reduced": [{"rod"}, {"analytic", "trained"}, {""}, {"training"}],
-    "design": [{"target"}, {"search"}, {"report"}, {""}],
+    "design": [{"target"}, {"segmentation"}, {"search"}, {"report"}, {""}],
 }
 #: what only these packages' modules may import; all else (matplotlib, pyvista) is for the inside of functions
 SOLVERS = {"dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"}

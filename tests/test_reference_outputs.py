@@ -7,13 +7,22 @@ from tests import reference_outputs
 STORED = json.loads(reference_outputs.STORED.read_text())
 
 
-def largest_difference(outputs):
-    return reference_outputs.largest_difference({name: STORED[name] for name in outputs}, outputs)
+#: largest relative difference; figures of held-out designs are small differences of large numbers, which
+#: another processor's rounding moves by 5e-9
+TOLERANCE = {"free strains": 1e-10, "centrelines": 1e-10, "held-out figures": 1e-7}
+
+
+def differences(outputs):
+    return {
+        name: reference_outputs.largest_difference(STORED[name], found) for name, found in outputs.items()
+    }
 
 
 def test_reduced_models():
-    assert largest_difference(reference_outputs.reduced_outputs()) < 1e-10
+    found = differences(reference_outputs.reduced_outputs())
+    assert all(found[name] < bar for name, bar in TOLERANCE.items()), found
 
 
 def test_finite_elements():
-    assert largest_difference(reference_outputs.finite_element_outputs()) < 1e-8
+    found = differences(reference_outputs.finite_element_outputs())
+    assert max(found.values()) < 1e-8, found

@@ -15,7 +15,7 @@ COMMANDS = {
     CAMPAIGN: "pneunet campaign",
 }
 _OF_CAMPAIGNS = {"designs", "edge_designs", "mesh", "ranges", "edge_ranges", "further"}
-_OF_TARGETS = {"points", "points_mm", "piece", "vary"}
+_OF_TARGETS = {"points", "points_mm", "piece", "vary", "wrap", "shape", "tip_points", "casting"}
 
 
 def read_tables(path: str | Path, wanted: str) -> dict:

@@ -112,6 +112,12 @@ def read_numbers_table(path: str | Path) -> Table:
     """
     text = read_text(path)
     delimiter = max(",;\t", key=lambda one: _consistency(text[:SAMPLE], one))
+    if not _consistency(text[:SAMPLE], delimiter)[
+        0
+    ]:  # columns between blanks, as CAD and plotters write them
+        single = "\n".join(" ".join(line.split()) for line in text.splitlines())
+        if _consistency(single[:SAMPLE], " ")[0]:
+            text, delimiter = single, " "
     table = _largest_table(path, _rows(path, text, delimiter))
     width = table.width
     for row, line in zip(table.rows, table.lines):
@@ -207,9 +213,16 @@ def _header(above, first):
     if not above or len(above[-1]) == 1 < len(first):
         return _BARE
     units = above[-1] if len(above) > 1 and all(_UNIT.fullmatch(c) for c in above[-1] if c) else []
-    header = above[-2] if units else above[-1]
+    header = _uncommented(above[-2] if units else above[-1], len(first))
     width = max(len(header), len(units))
     return tuple([*header, *[""] * width][:width]), tuple([*units, *[""] * width][:width])
+
+
+def _uncommented(header, width):
+    """A header's cells without the mark of a comment before them."""
+    if header[0] in ("#", "%", "//") and len(header) > width:
+        return header[1:]
+    return [header[0].removeprefix("#").removeprefix("//").lstrip(), *header[1:]]
 
 
 def _refuse_two_decimal_signs(table):

@@ -145,6 +145,10 @@ def _read(value: object, key: str, field: Field, where: str) -> Any:
         return number(value, key, where) * factor
     if field.type is int:
         return number(value, key, where, integer=True)
+    if field.type == float | tuple[float, ...]:
+        if not isinstance(value, list):
+            return number(value, key, where) * factor
+        return tuple((array(value, key, where, "numbers", (None,)) * factor).tolist())
     if field.type is tuple:
         return tuple(v * factor for v in vector(value, key, where))
     for kind, words in ((bool, "true or false"), (str, "text in quotes")):

@@ -170,10 +170,14 @@ def show(ax: Any, view: View, image: np.ndarray, overlays: Sequence[Overlay] = (
     _triad(ax, view)
 
 
-def _scale_bar(ax, view):
-    wanted = 0.2 * PIXELS[0] * view.millimetres_per_pixel
+def round_length(wanted: float) -> float:
+    """1, 2 or 5 times a power of ten, at most what is wanted."""
     decade = 10 ** np.floor(np.log10(wanted))
-    length = decade * max(n for n in (1, 2, 5) if n * decade <= wanted)
+    return float(decade * max(n for n in (1, 2, 5) if n * decade <= wanted))
+
+
+def _scale_bar(ax, view):
+    length = round_length(0.2 * PIXELS[0] * view.millimetres_per_pixel)
     pixels = length / view.millimetres_per_pixel
     x, y = PIXELS[0] - 30, PIXELS[1] - 22
     ax.plot([x - pixels, x], [y, y], color="black", linewidth=2.2, solid_capstyle="butt")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base import se3
 from pneunet.base.errors import InputError
@@ -15,7 +16,7 @@ from pneunet.base.files.text import read_text
 from pneunet.base.pictures.rendering import View, edges, view_of
 from pneunet.base.pictures.walls import FIELD
 from pneunet.design.report.comparison import Comparison
-from pneunet.design.report.labels import TARGET, segment_colour
+from pneunet.design.report.labels import TARGET, rgb, segment_colour
 from pneunet.design.report.rundata import DesignFolder
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.rod.laws import SegmentLaw
@@ -35,7 +36,7 @@ def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple
 
 
 def body_mesh(
-    manipulator: Manipulator, pressure: float, law: SegmentLaw, base_pose: np.ndarray | None
+    manipulator: Manipulator, pressure: ArrayLike, law: SegmentLaw, base_pose: np.ndarray | None
 ) -> "PolyData":
     """The reduced model's body (pyvista.PolyData, mm, target coordinates), cell data "segment" 1.. ."""
     import pyvista
@@ -50,12 +51,10 @@ def body_mesh(
 
 def painted(mesh: "PolyData") -> list[tuple["PolyData", dict]]:
     """A body in the colours of its segments, with its sharp edges, as things to render."""
-    from matplotlib.colors import to_rgb
-
     mesh = mesh.copy()
     segments = np.asarray(mesh.cell_data["segment"]) - 1
-    colours = np.array([to_rgb(segment_colour(i)) for i in range(segments.max() + 1)])
-    mesh.cell_data["colour"] = (255 * colours[segments]).astype(np.uint8)
+    colours = np.array([rgb(segment_colour(i)) for i in range(segments.max() + 1)], np.uint8)
+    mesh.cell_data["colour"] = colours[segments]
     return [(mesh, {"scalars": "colour", "rgb": True, "preference": "cell"}), edges(mesh)]
 
 
@@ -122,7 +121,7 @@ class Scene:
     def of(cls, run: DesignFolder, comparison: Comparison, law: SegmentLaw) -> "Scene":
         """Of a folder, whose fields are sound, and of what was compared there."""
         design, solve, reduced, solved = run.design, run.solve, None, None
-        pressure = design.pressure if solve is None else solve.pressure
+        pressure = design.pressure if solve is None else design.scaled(solve.pressure)
         if (comparison.reduced if solve is None else comparison.reduced_at_solve) is not None:
             reduced = body_mesh(design.manipulator, pressure, law, design.base_pose)
         if solve is not None and solve.solution is not None:

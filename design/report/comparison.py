@@ -14,8 +14,8 @@ from pneunet.design.report.labels import kPa, plain, significant
 from pneunet.design.report.rundata import DesignFolder
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.geometry.designfile import DesignFile
-from pneunet.reduced import doubts, predict
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
 
 #: how far prediction and finite elements may be apart before the verdict looks for a cause: % of length (RMS
 #: of points paired by arc length), % of the largest |k| of a segment
@@ -47,7 +47,7 @@ class Comparison:
     def of(cls, run: DesignFolder, law: SegmentLaw) -> "Comparison":
         """What a folder holds against what a law predicts."""
         design = run.design
-        doubted = doubts(design.manipulator, design.pressure, law)
+        doubted = doubts(design.manipulator, [design.pressure], law)
         notes = [f"The law '{law.name}' of the reduced model is in doubt: {text}." for text in doubted]
         solved = at_solve = strains = None
         reduced = _predict(design, design.pressure, law, notes)
@@ -71,15 +71,16 @@ class Comparison:
                 nearest = _nearest(run)
             solved = se3.transform(design.base_pose, smooth(run.solve.s, run.solve.points))
             if stopped_short(run):
-                last = kPa(run.solve.pressure)
+                last = kPa(design.scaled(run.solve.pressure))
                 notes.append(
                     f"The finite element solution stops at {last}, below the design pressure of "
                     f"{kPa(design.pressure)}. It is compared with the reduced model at {last}; "
                     "its distance to the target is that of a body not fully inflated."
                 )
-            at_solve = _predict(design, run.solve.pressure, law, notes)
+            pressure = design.scaled(run.solve.pressure)
+            at_solve = _predict(design, pressure, law, notes)
             if at_solve is not None:
-                strains = law.each(design.manipulator.segments, run.solve.pressure)
+                strains = segment_strains(design.manipulator, pressure, law)
         return cls(
             reduced,
             at_solve,
@@ -130,7 +131,7 @@ def _nearest(run):
 
 def stopped_short(run: DesignFolder) -> bool:
     """Whether the finite element solution ended below the design pressure (by more than rounding)."""
-    return run.solve is not None and run.solve.pressure < run.design.pressure * (1 - 1e-6)
+    return run.solve is not None and run.solve.pressure < run.design.largest_pressure * (1 - 1e-6)
 
 
 def _predict(design, pressure, law, notes):
@@ -189,7 +190,7 @@ def verdict(run: DesignFolder, comparison: "Comparison") -> str:
         if promise:
             return f"F{promise[1:]}; there is no finite element solution to compare it with yet."
         return "There is neither a target nor a finite element solution to judge the prediction by."
-    pressure = kPa(solve.pressure)
+    pressure = kPa(run.design.scaled(solve.pressure))
     if c.reduced_solved is None:
         sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"
     else:
@@ -215,11 +216,12 @@ def verdict(run: DesignFolder, comparison: "Comparison") -> str:
         reason = "stopped short of"
         if solve.record.get("control", "pressure") != "pressure":
             reason = "ends below"
-        elif asked < run.design.pressure * (1 - 1e-6):
+        elif asked < run.design.largest_pressure * (1 - 1e-6):
             reason = "was asked for less than"
         sentence += f"; the solution {reason} the design pressure, {wanted}"
     if c.nearest and c.nearest[0] < solve.pressure:
-        sentence += f". Its step nearest to the target is at {kPa(c.nearest[0])}, with {_mm(c.nearest[1])}"
+        at = kPa(run.design.scaled(c.nearest[0]))
+        sentence += f". Its step nearest to the target is at {at}, with {_mm(c.nearest[1])}"
     if overlaps(run):
         sentence = "NOT PROVEN. " + ". ".join(
             [sentence, *overlaps(run), "The finite element shape is not what a real body would take"]

@@ -32,9 +32,9 @@ FIELDS = (
 MAP = "turbo"
 
 
-def _at(solve):
+def _at(design, solve):
     """End of the titles of finite element pictures: the pressure, and whether parts overlap in them."""
-    return kPa(solve.pressure) + " (overlaps)" * (solve.walls_overlap or solve.body_overlap)
+    return kPa(design.scaled(solve.pressure)) + " (overlaps)" * (solve.walls_overlap or solve.body_overlap)
 
 
 def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> list[tuple[str, str]]:
@@ -45,10 +45,10 @@ def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> 
         curves.append(("target", run.target, "target"))
     reduced = comparison.reduced if solve is None else comparison.reduced_at_solve
     if reduced is not None:
-        pressure = design.pressure if solve is None else solve.pressure
+        pressure = design.pressure if solve is None else design.scaled(solve.pressure)
         curves.append((f"reduced, {kPa(pressure)}", reduced, "reduced"))
     if solve is not None and solved is not None:
-        curves.append((f"finite elements, {_at(solve)}", solved, "finite elements"))
+        curves.append((f"finite elements, {_at(design, solve)}", solved, "finite elements"))
         s = np.linspace(solve.s[0], solve.s[-1], len(solved))
         bands = segment_bands(design.manipulator, s, solved)
     if not curves:
@@ -65,7 +65,7 @@ def body_pictures(run: DesignFolder, scene: Scene, folder: Path) -> list[tuple[s
     """Target, reduced body and finite element body from one camera at one scale; fields on the finite element
     body; the reference body."""
     solve = run.solve
-    pressure = run.design.pressure if solve is None else solve.pressure
+    pressure = run.design.pressure if solve is None else run.design.scaled(solve.pressure)
     dashed = [] if run.target is None else [(run.target, STYLES["target"] | {"linewidth": 3.0})]
     with_target = "; dashed in front: the target" * bool(dashed)
     out = []
@@ -91,7 +91,7 @@ def body_pictures(run: DesignFolder, scene: Scene, folder: Path) -> list[tuple[s
         picture(
             "fe.png",
             [(surface, {"color": FINITE_ELEMENTS}), lines],
-            f"finite elements, {_at(solve)}",
+            f"finite elements, {_at(run.design, solve)}",
             f"The finite element body{with_target}.",
             overlays=dashed,
         )
@@ -111,7 +111,7 @@ def body_pictures(run: DesignFolder, scene: Scene, folder: Path) -> list[tuple[s
             picture(
                 name,
                 [(coloured, look | EVENLY_LIT), lines],
-                f"{what}, {_at(solve)}",
+                f"{what}, {_at(run.design, solve)}",
                 f"{caption}.",
                 bar=(f"{what} ({unit.strip() or '-'})", limits, MAP),
                 extend="max" if beyond else "neither",
@@ -138,7 +138,7 @@ def history_picture(
     levels, tips = np.linspace(0, p.max(), 15), []
     for level in levels:
         try:
-            tips.append(predict(design.manipulator, level * MPA_PER_KPA, law).points[-1])
+            tips.append(predict(design.manipulator, design.scaled(level * MPA_PER_KPA), law).points[-1])
         except ConvergenceError:
             break
     for i, (name, colour) in enumerate(zip("xyz", ("#1f6fb2", "#2f9e44", "#d9480f"))):
@@ -182,7 +182,7 @@ def history_picture(
     axes[1, 0].axhspan(axes[1, 0].get_ylim()[0], 0.0, color="#c92a2a", alpha=0.12)
     for ax in axes.flat:
         ax.set_xlabel("pressure (kPa)")
-        ax.axvline(design.pressure * KPA_PER_MPA, color="#868e96", linewidth=0.9, linestyle=":")
+        ax.axvline(design.largest_pressure * KPA_PER_MPA, color="#868e96", linewidth=0.9, linestyle=":")
         ax.set_xlim(left=0.0)
         ax.grid(True, linewidth=0.4, alpha=0.6)
     fig.subplots_adjust(left=0.08, right=0.98, top=0.92, bottom=0.08, wspace=0.24, hspace=0.28)
@@ -211,7 +211,7 @@ def touching_picture(
     gap = max(s.gap for s in design.manipulator.segments)
     touching = TOUCHING * gap * solve.contact
     around = f"is nearer than {touching:.2g} mm: contact" if touching else "lies behind the other: overlap"
-    title = f"distance of walls, {_at(solve)}"
+    title = f"distance of walls, {_at(design, solve)}"
     draw_walls(folder / "fe_walls.png", surface, lines, walls, gap, title, touching, scene.view)
     return [
         (
@@ -284,7 +284,8 @@ def wall_picture(manipulator: Manipulator, solve: Solution, folder: Path) -> lis
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
         ax.set_title(
-            "upper chambers" if side > 0 else "lower chambers (seen through the body)",
+            ("upper chambers" if side > 0 else "lower chambers (seen through the body)")
+            + ", each segment as before its roll" * any(s.roll for s in manipulator.segments),
             fontsize=9,
             loc="left",
             pad=7,

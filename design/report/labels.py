@@ -3,7 +3,7 @@
 import math
 
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.geometry.parameters import TWISTING, Segment
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
 
 TARGET, REDUCED, FINITE_ELEMENTS = "#30363d", "#1f6fb2", "#d9480f"
 STYLES: dict[str, dict] = {
@@ -18,6 +18,12 @@ def segment_colour(index: int) -> str:
     return SEGMENT_COLOURS[index % len(SEGMENT_COLOURS)]
 
 
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue from 0 to 255 of '#rrggbb'."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
+
+
 def plain(value: float, decimals: int = 2) -> str:
     """A number without trailing zeros: 2 -> '2', 5.7735 -> '5.77'."""
     text = f"{value:.{decimals}f}"
@@ -25,9 +31,10 @@ def plain(value: float, decimals: int = 2) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def kPa(pressure: float) -> str:
-    """A pressure in MPa: 0.035 -> '35 kPa'."""
-    return f"{plain(pressure * KPA_PER_MPA)} kPa"
+def kPa(pressure: float | tuple[float, ...]) -> str:
+    """A pressure in MPa, or one for each group of segments: 0.035 -> '35 kPa', (0.03, 0) -> '30 / 0 kPa'."""
+    each = pressure if isinstance(pressure, tuple) else (pressure,)
+    return f"{' / '.join(plain(p * KPA_PER_MPA) for p in each)} kPa"
 
 
 def significant(value: float, digits: int = 4) -> str:
@@ -45,12 +52,15 @@ def signed(value: float, digits: int = 4) -> str:
 
 
 def segment_mode(segment: Segment) -> str:
-    """What a segment does: twisting; bending at exactly 90 degrees; else helical."""
-    if segment.kind == TWISTING:
-        return "twisting"
+    """What a segment does: twisting or nothing (passive); bending at exactly 90 degrees; else helical."""
+    if segment.kind in (TWISTING, PASSIVE):
+        return segment.kind
     return "bending" if segment.cot == 0 else "helical"
 
 
 def segment_name(segment: Segment) -> str:
-    """'twisting 60° × 8'"""
-    return f"{segment_mode(segment)} {plain(segment.angle, 1)}° × {segment.chambers}"
+    """'twisting 60° × 8', 'bending 90° × 8, rolled 180°' or 'passive 20 mm'"""
+    if segment.kind == PASSIVE:
+        return f"{PASSIVE} {plain(segment.length)} mm"
+    rolled = f", rolled {segment.roll}°" if segment.roll else ""
+    return f"{segment_mode(segment)} {plain(segment.angle, 1)}° × {segment.chambers}{rolled}"

@@ -170,9 +170,12 @@ def _headline(run, comparison):
         length = f", {errors.reference_length:.1f} mm long" if errors else ""
         asked = f"A curve of {len(run.target)} points{length} ({design.target or 'target.csv'})."
     names = ", ".join(segment_name(s) for s in m.segments)
+    told = f"one pressure of {kPa(design.pressure)}"
+    if len(m.groups) > 1:
+        told = f"{len(m.groups)} pressure groups at {kPa(design.pressure)}"
     designed = (
         f"{len(m.segments)} segment{'s' * (len(m.segments) > 1)} ({names}), {m.length:.1f} mm long at rest, "
-        f"{m.segments[0].width:g} mm wide, one pressure of {kPa(design.pressure)}."
+        f"{m.segments[0].width:g} mm wide, {told}."
     )
     out = (
         f"<h1>{escape(design.name)}</h1><p><b>Asked:</b> {escape(asked)}<br><b>Designed:</b>"
@@ -215,7 +218,7 @@ def _shapes(run, comparison, scene, folder):
 
 
 def _errors(comparison, run):
-    at = f" at {kPa(run.solve.pressure)}" if run.solve else ""
+    at = f" at {kPa(run.design.scaled(run.solve.pressure))}" if run.solve else ""
     columns = [
         (f"reduced vs target at {kPa(run.design.pressure)}", comparison.reduced_target),
         (f"FE vs target{at}", comparison.solved_target),
@@ -269,7 +272,7 @@ def _strains(run, comparison):
             rows.append([label, told, _fixed(fe, digits), ratio])
     return (
         _alarms(run)
-        + _table([f"at {kPa(run.solve.pressure)}", "reduced", "FE", "FE / reduced"], rows)
+        + _table([f"at {kPa(run.design.scaled(run.solve.pressure))}", "reduced", "FE", "FE / reduced"], rows)
         + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not"
         " depend on that choice.</p>"
     )

@@ -1,7 +1,8 @@
 """Inverse design: the manipulator and the pressure whose predicted centreline lies on the target.
 
-Bounded least squares over angles, dimensions, numbers of chambers, the common pressure and the direction of
-the base: a first guess from the lookup table, then chambers counted as real numbers, then as whole ones.
+Bounded least squares with exact derivatives over angles, dimensions, numbers of chambers, the pressure and
+the base's direction: from first guesses of the lookup table, with chambers counted as real numbers, then as
+whole ones, then with dimensions on the grid that they are cast on.
 """
 
 import logging
@@ -9,49 +10,90 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pneunet.base import se3
 from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.design.search.lookup import first_guesses
-from pneunet.design.search.problem import EQ27, OBJECTIVES, PAIRED, PAIRS, Calls, Problem, Trial
-from pneunet.design.search.space import Variable, grid, limits, prototype
+from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, PAIRS, Aim
+from pneunet.design.search.lookup import Guess, first_guesses
+from pneunet.design.search.problem import Body, Evaluation, Problem
+from pneunet.design.search.space import Variable, grid, limits, prototype, variables_of
+from pneunet.design.search.whole import on_grid, optimised, with_whole_chambers
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import PRESSURE_LIMIT, Target
-from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.laws import SegmentLaw
 
 LEAST_PRESSURE = 0.002  # MPa
-INSET = 0.05  # of a variable's range: starts keep off the bounds, where the interior method crawls
-#: cost over that of the next start from there, which leaves the bounds, at which an optimum is one
-CONFIRMED = 1.05
 SPLIT_KEPT = 0.3  # a segment's number of chambers stays within this fraction of what its piece asks for
-#: cost of whole chambers over that of real-valued ones at which the search for others stops
-GOOD_ENOUGH = 1.05
-FINE_ENOUGH = 1e-3  # objective over the curve's length at which it stops as well
-ROUNDING = {"angle": 2}  # decimals; mm and everything else to 3
+#: of the curve's length: nothing better is looked for below the first; starts are tried until one is below
+#: the second
+FINE_ENOUGH, GOOD_ENOUGH = 1e-4, 1e-3
+STARTS = 4
+#: alternatives: so many, at pressures (MPa) so far apart, with angles (deg) so different or other numbers
+ALTERNATIVES, APART, DISTINCT = 3, 0.008, 3.0
+#: RMS of an alternative over the design's at which it takes its place
+BETTER = 0.9
+#: name -> step beyond a bound that its cost is told of, in words; 0.1 mm of all others
+USUAL = {"angle": (1.0, "1 deg"), "pressure": (0.001, "1 kPa"), "chambers": (1.0, "1")}
+#: mm; bounds that cost less are named without
+WORTH_TELLING = 0.005
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Found:
-    """base_pose (4, 4) in target coordinates; pressure in MPa; cost in mm^2; active: bounds the optimum sits
-    on."""
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A body that can be cast: pressures (aims,) in MPa; base_pose (4, 4) in target coordinates; rms: root
+    mean square misfit, mm; problem, at: what it is the optimum of, and its Evaluation."""
 
     manipulator: Manipulator
-    pressure: float
+    pressures: np.ndarray
     base_pose: np.ndarray
-    cost: float
+    rms: float
+    problem: Problem
+    at: Evaluation
+
+    @property
+    def pressure(self) -> float:
+        """Of the first shape, MPa."""
+        return float(self.pressures[0])
+
+    def __str__(self) -> str:
+        segments = self.manipulator.segments
+        counts = " / ".join(str(s.chambers) for s in segments)
+        pressures = ", ".join(f"{KPA_PER_MPA * P:.1f}" for P in self.pressures)
+        return f"angles {_angles(segments)} deg, chambers {counts}, {pressures} kPa, RMS {self.rms:.2f} mm"
+
+    def differs(self, other: "Candidate") -> bool:
+        """Whether another one has other numbers of chambers or clearly other angles."""
+        pairs = list(zip(self.manipulator.segments, other.manipulator.segments))
+        return any(a.chambers != b.chambers or abs(a.angle - b.angle) >= DISTINCT for a, b in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """best: the design. alternatives: distinct ones, best first. active: bounds that the optimum sits on, and
+    what they cost; stopped_by: the one that costs most, "" where none costs anything. flush_costs: mm by
+    which steps in the underside would lower the misfit."""
+
+    best: Candidate
+    alternatives: tuple[Candidate, ...]
     active: tuple[str, ...]
-    grown: tuple[str, ...]
+    stopped_by: str
+    flush_costs: float
     evaluations: int
 
 
-def search(target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objective: str = PAIRED) -> Found:
-    """The `Found` for a Target split into `pieces` (`Extracted`).
+def search(
+    target: Target,
+    pieces: Sequence[Extracted],
+    law: SegmentLaw,
+    objective: str = PAIRED,
+    alternatives: int = ALTERNATIVES,
+) -> Found:
+    """The `Found` for a Target split into `pieces` (`Extracted`), with so many alternatives at most.
 
     InputError where the pieces cannot be built, ConvergenceError where the law has no answer at any pressure.
     """
@@ -63,24 +105,13 @@ def search(target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objecti
         raise ConvergenceError(
             "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
         )
-    log.info(
-        f"lookup table: first guess at {KPA_PER_MPA * guesses[0].pressure:.1f} kPa, angles "
-        + _angles(guesses[0].segments)
-    )
-    run = _Run.start(target, pieces, law, guesses[0]).optimised(real_counts=True)
-    if objective == EQ27:
-        run = run.with_objective(EQ27).optimised(real_counts=True)
-    log.info(f"real-valued optimum: {run.title}")
-    run = _whole_chambers(run)
-    log.info(f"whole chambers:      {run.title}")
-    return run.solution()
+    return _Search(target, tuple(pieces), law, objective, alternatives).run(guesses)
 
 
 def _guesses(target, pieces, prototypes, law):
     angles, heights = [], []
     for i, (piece, segment) in enumerate(zip(pieces, prototypes)):
-        least = 2 * segment.end_length + segment.chamber_thickness
-        if piece.length < least:
+        if segment.kind != PASSIVE and piece.length < (least := shortest(segment)):
             found = f"length_mm = {piece.length:.3g}"
             raise InputError(
                 f"[[piece]] {i + 1}: {found} is too short for one chamber and its ends ({least:.3g} mm)"
@@ -95,198 +126,248 @@ def _guesses(target, pieces, prototypes, law):
     return first_guesses(pieces, prototypes, angles, heights, pressures, law)
 
 
+def shortest(segment: Segment) -> float:
+    """Length (mm) of one chamber and its ends, at rest."""
+    return 2 * segment.end_length + segment.chamber_thickness
+
+
 def _angles(segments):
-    return " / ".join(f"{s.angle:.0f}" for s in segments)
+    return " / ".join("plain" if s.kind == PASSIVE else f"{s.angle:.0f}" for s in segments)
 
 
-@dataclass(frozen=True)
-class _Run:
-    """A problem, its variables with their present values and ranges, and the cost there."""
+class _Search:
+    """The way from guesses to a Found; counts evaluations."""
 
-    problem: Problem
-    variables: tuple[Variable, ...]
-    cost: float = np.inf
-    grown: tuple[str, ...] = ()
-    evaluations: int = 0
+    def __init__(self, target, pieces, law, objective, most):
+        self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
+        self.optima = []
+        self.most = most if objective == PAIRED else 0
+        self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
 
-    @classmethod
-    def start(cls, target, pieces, law, guess):
-        """From an entry of the lookup table, with the base turned to the target."""
-        variables = []
-        for i, (piece, segment) in enumerate(zip(pieces, guess.segments)):
-            preferred = prototype(target, piece)
-            for name, ((low, high), (least, most)) in limits(target, piece, segment).items():
-                value, usual = (float(np.clip(getattr(s, name), low, high)) for s in (segment, preferred))
-                start = None if name == "angle" else usual
-                variables.append(Variable(name, i, value, low, high, least, most, start))
-        if target.pressure_range is None:
-            low, high = max(LEAST_PRESSURE, 0.6 * guess.pressure), min(PRESSURE_LIMIT, 1.4 * guess.pressure)
-            variables.append(
-                Variable("pressure", None, guess.pressure, low, high, LEAST_PRESSURE, PRESSURE_LIMIT)
-            )
-        elif target.pressure_range[1] > target.pressure_range[0]:
-            low, high = target.pressure_range
-            variables.append(Variable("pressure", None, guess.pressure, low, high, low, high))
-        for i, n in enumerate(guess.counts):
-            low, high = max(1.0, (1 - SPLIT_KEPT) * n), (1 + SPLIT_KEPT) * n + 1
-            variables.append(Variable("chambers", i, n, low, high, low, high, n))
-        turns = np.eye(3)[:, : 3 if target.base_direction is None else 1 if target.base_width is None else 0]
-        problem = Problem(
-            target,
-            tuple(pieces),
-            law,
-            PAIRED,
-            guess.segments,
-            guess.counts,
-            guess.pressure,
-            _some_rotation(target),
-            turns,
-        )
-        return cls(problem, tuple(v for v in variables if v.high > v.low)).turned_to_target()
-
-    def allows(self, counts):
-        """Whether numbers of chambers lie in their ranges, rounded outwards."""
-        ranges = {
-            v.segment: (np.floor(v.low), np.ceil(v.high)) for v in self.variables if v.name == "chambers"
-        }
-        return all(ranges[i][0] <= n <= ranges[i][1] for i, n in enumerate(counts))
-
-    def with_objective(self, objective):
-        return replace(self, problem=replace(self.problem, objective=objective))
-
-    def with_counts(self, counts):
-        variables = tuple(
-            replace(v, value=float(counts[v.segment])) if v.name == "chambers" else v for v in self.variables
-        )
-        problem = replace(self.problem, counts=tuple(float(n) for n in counts))
-        return replace(self, problem=problem, variables=variables, cost=np.inf)
-
-    def turned_to_target(self):
-        """The base turned about its free axes to bring the present curve nearest to the target, in closed
-        form."""
-        problem, free = self.problem, self.problem.turns.shape[1]
-        trial = Trial(problem, self.variables, self._x(self.variables))
-        points = Curve(trial.centreline(problem.law, np.zeros(3)).points).evenly(PAIRS) @ problem.rotation
-        wanted = (problem.target.curve.evenly(PAIRS) - problem.target.points[0]) @ problem.rotation
-        moment = points.T @ wanted
-        turn = np.eye(3)
-        if free == 1:
-            turn = se3.exp_rotation(
-                np.array([np.arctan2(moment[1, 2] - moment[2, 1], moment[1, 1] + moment[2, 2]), 0, 0])
-            )
-        elif free == 3:
-            U, _, Vt = np.linalg.svd(moment)
-            turn = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
-        return replace(self, problem=replace(problem, rotation=problem.rotation @ turn))
-
-    def _x(self, variables):
-        return np.array([v.value for v in variables] + [0.0] * self.problem.turns.shape[1])
-
-    def optimised(self, real_counts):
-        """The local optimum; ranges grow while it sits on a bound that may, and a new start has to confirm
-        it."""
-        run = self
-        while True:
-            before, run = run.cost, run.optimised_once(real_counts)
-            variables = tuple(v.grown for v in run.variables)
-            if variables == run.variables and before < CONFIRMED * run.cost:
-                return run
-            names = [v.title for v, w in zip(run.variables, variables) if v != w]
-            run = replace(run, variables=variables, grown=tuple(dict.fromkeys(run.grown + tuple(names))))
-
-    def optimised_once(self, real_counts):
-        """The local optimum within the present ranges."""
-        problem, free = self.problem, self.problem.turns.shape[1]
-        variables = tuple(v for v in self.variables if real_counts or v.name != "chambers")
-        scale = np.array([v.scale for v in variables] + [1.0] * free)
-        low = np.array([v.low for v in variables] + [-np.inf] * free)
-        high = np.array([v.high for v in variables] + [np.inf] * free)
-        calls = Calls(problem, variables, scale, high)
-        inset = np.array([INSET * (v.high - v.low) for v in variables] + [0.0] * free)
-        starts = [np.clip(self._x(variables), low + d, high - d) for d in (inset, 0 * inset)]
-        start = next((x for x in starts if calls.attempt(x) is not None), None)
-        if start is None:
-            raise ConvergenceError(
-                f"the law has no equilibrium at {KPA_PER_MPA * problem.pressure:.1f} kPa: lower the pressure"
-            )
-        options = {"x_scale": scale, "xtol": 1e-5, "ftol": 3e-3, "gtol": 1e-10, "max_nfev": 40}
-        fit = least_squares(calls.residual, start, calls.jacobian, (low, high), **options)
-        trial = Trial(problem, variables, fit.x)
-        found = dict(zip(variables, fit.x))
-        values = tuple(replace(v, value=float(found.get(v, v.value))) for v in self.variables)
-        problem = replace(
-            problem,
-            prototypes=tuple(trial.segments),
-            counts=tuple(trial.counts),
-            pressure=trial.pressure,
-            rotation=trial.rotation,
-        )
-        return replace(
-            self,
-            problem=problem,
-            variables=values,
-            cost=2 * fit.cost,
-            evaluations=self.evaluations + calls.count,
+    def run(self, guesses):
+        problem, optimum = self._from_guesses(guesses)
+        if self.objective == EQ27:
+            aims = (Aim.of(self.target, problem.body.segments[0].width, EQ27),)
+            problem, optimum = self._counted(optimised(replace(problem, aims=aims), self.floor))
+        log.info(f"real-valued optimum: {_told(problem, optimum)}")
+        flush = self._flush_costs(problem, optimum)
+        whole = self._whole(problem, optimum)
+        log.info(f"whole chambers:      {_told(*whole)}")
+        best = self._cast(whole)
+        log.info(f"dimensions on grid:  {best}")
+        bounds = sorted(_active(*whole), key=lambda pair: -pair[0])
+        stopped = bounds[0][1] if bounds and bounds[0][0] > 0 else ""
+        alternatives = self._alternatives(best, whole, guesses)
+        if alternatives and alternatives[0].rms < BETTER * best.rms:
+            best, alternatives = alternatives[0], (best, *alternatives[1:])
+        touching = about_to_touch(best.manipulator.segments, float(best.pressures.max()))
+        return Found(
+            best, alternatives, (*(text for _, text in bounds), *touching), stopped, flush, self.evaluations
         )
 
-    @property
-    def title(self):
-        counts = " / ".join(f"{n:.3g}" for n in self.problem.counts)
-        return (
-            f"angles {_angles(self.problem.prototypes)} deg, chambers {counts},"
-            f" {KPA_PER_MPA * self.problem.pressure:.1f} kPa,"
-            f" objective {np.sqrt(self.cost):.3f} mm (root mean square)"
-        )
+    def _counted(self, found):
+        if found is None:
+            raise ConvergenceError("the law has no equilibrium near the first guess: lower the pressure")
+        self.evaluations += found[1].evaluations
+        return found
 
-    def solution(self):
-        """Rounded to what a drawing can say, with the cost there."""
-        segments = []
-        for i, (segment, count) in enumerate(zip(self.problem.prototypes, self.problem.counts)):
-            names = [v.name for v in self.variables if v.segment == i and v.name != "chambers"]
-            sizes = {name: round(getattr(segment, name), ROUNDING.get(name, 3)) for name in names}
-            segments.append(replace(segment, chambers=round(count), **sizes))
-        pressure = round(self.problem.pressure, 6)
-        rounded = replace(self.problem, prototypes=tuple(segments), pressure=pressure)
-        residual = rounded.residual(Trial(rounded, (), np.zeros(self.problem.turns.shape[1])))
-        active = (*(v.text for v in self.variables if v.text), *about_to_touch(segments, pressure))
-        pose = se3.make_pose(self.problem.rotation, self.problem.target.points[0])
-        body, cost = Manipulator(tuple(segments)), float(residual @ residual)
-        return Found(body, pressure, pose, cost, active, self.grown, self.evaluations)
+    def _from_guesses(self, guesses):
+        """The best of the local optima from the most promising guesses."""
+        log.info(
+            f"lookup table: first guess at {KPA_PER_MPA * guesses[0].pressure:.1f} kPa, angles "
+            + _angles(guesses[0].segments)
+        )
+        for guess in guesses[:STARTS]:
+            self._try(start(self.target, self.pieces, self.law, guess))
+            best = min(self.optima, key=lambda found: found[1].cost, default=None)
+            if best and best[1].cost < (GOOD_ENOUGH * self.target.length) ** 2:
+                break
+        if not self.optima:
+            least = KPA_PER_MPA * min(g.pressure for g in guesses)
+            raise ConvergenceError(f"the law has no equilibrium at {least:.1f} kPa: lower the pressure")
+        return best
+
+    def _try(self, problem):
+        """Its local optimum to the others'."""
+        found = optimised(problem, self.floor)
+        if found is not None:
+            self.evaluations += found[1].evaluations
+            self.optima.append(found)
+        return found
+
+    def _flush_costs(self, problem, optimum):
+        """By how much (mm) the root mean square would fall if undersides need not be flush."""
+        joined = [v for v in problem.variables if v.name == "base_thickness" and len(v.segments) > 1]
+        if not joined:
+            return 0.0
+        apart = tuple(replace(v, segments=(i,)) for v in joined for i in v.segments)
+        kept = tuple(v for v in problem.variables if v not in joined)
+        found = optimised(replace(problem, variables=kept + apart), self.floor)
+        if found is None:
+            return 0.0
+        self.evaluations += found[1].evaluations
+        return max(0.0, float(np.sqrt(optimum.at.misfit) - np.sqrt(found[1].at.misfit)))
+
+    def _grid(self):
+        casting = self.target.casting
+        names = ("wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall")
+        names += ("cavity_thickness", "gap", "end_margin", "plain_length")
+        steps = dict.fromkeys(names, casting.grid or 0.001)
+        return {"angle": casting.angle_grid or 0.01} | steps
+
+    def _whole(self, problem, optimum):
+        """With whole numbers of chambers."""
+        found = with_whole_chambers(problem, optimum, self.floor)
+        self.evaluations += sum(o.evaluations for _, o in found)
+        if not found:
+            raise ConvergenceError("no whole numbers of chambers near the optimum can be built")
+        return found[0]
+
+    def _cast(self, whole):
+        """The Candidate on the grid."""
+        problem, optimum = on_grid(whole, self._grid(), self.floor)
+        self.evaluations += optimum.evaluations
+        body = problem.body
+        pressures = body.pressures[:, 0].round(6)
+        body = replace(body, pressures=np.broadcast_to(pressures[:, None], body.pressures.shape))
+        problem = replace(problem, body=body, everything=True)
+        at = problem.evaluate(problem.x) or optimum.at
+        segments = tuple(replace(s, chambers=round(n)) for s, n in zip(body.segments, body.counts))
+        rms = float(np.sqrt(at.misfit))
+        return Candidate(Manipulator(segments), pressures, body.base_pose, rms, problem, at)
+
+    def _alternatives(self, best, whole, guesses):
+        """Distinct Candidates that are not much worse."""
+        found, allowed = [], max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+        for other in self._others(whole, guesses) if self.most else ():
+            if np.sqrt(other[1].at.misfit) > allowed:
+                continue
+            candidate = self._cast(other)
+            if candidate.rms <= allowed and all(candidate.differs(c) for c in (best, *found)):
+                found.append(candidate)
+                if len(found) == self.most:
+                    break
+        return tuple(sorted(found, key=lambda c: c.rms))
+
+    def _others(self, whole, guesses):
+        """With whole chambers: from the other local optima, at other pressures, with one chamber more or
+        less."""
+        chosen = whole[0].body.pressures[0, 0]
+        seen = [chosen]
+        for problem, optimum in sorted(self.optima, key=lambda found: found[1].cost):
+            if min(abs(problem.body.pressures[0, 0] - P) for P in seen) >= APART:
+                seen.append(problem.body.pressures[0, 0])
+                yield self._whole(problem, optimum)
+        apart = [g for g in guesses[:ALTERNATIVES] if min(abs(g.pressure - P) for P in seen) >= APART]
+        for guess in apart:
+            first = start(self.target, self.pieces, self.law, guess)
+            if found := self._try(_held_near(first, guess.pressure)):
+                yield self._whole(*found)
+        body = whole[0].body
+        longest = int(np.argmax(body.counts))
+        for change in (1, -1):
+            counts = body.counts.copy()
+            counts[longest] = max(1, counts[longest] + change)
+            if found := self._try(replace(whole[0], body=replace(body, counts=counts))):
+                yield found
+
+
+def _held_near(problem, pressure):
+    """The Problem with its pressure kept near one (MPa)."""
+    low, high = pressure - APART / 2, pressure + APART / 2
+    variables = (
+        replace(v, low=max(v.low, low), high=min(v.high, high)) if v.name == "pressure" else v
+        for v in problem.variables
+    )
+    return replace(problem, variables=tuple(variables))
+
+
+def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess: Guess) -> Problem:
+    """The Problem at an entry of the lookup table, with the base turned to the target."""
+    segments, n = guess.segments, len(pieces)
+    variables = variables_of(target, pieces, segments, not target.casting.allow_steps)
+    everyone = tuple(range(n))
+    if target.pressure_range is None:
+        variables.append(Variable("pressure", everyone, LEAST_PRESSURE, PRESSURE_LIMIT, 0.02))
+    elif target.pressure_range[1] > target.pressure_range[0]:
+        low, high = target.pressure_range
+        variables.append(Variable("pressure", everyone, low, high, high - low))
+    for i, count in enumerate(guess.counts):
+        if segments[i].kind == PASSIVE:
+            continue
+        low, high = np.floor(max(1.0, (1 - SPLIT_KEPT) * count)), np.ceil((1 + SPLIT_KEPT) * count + 1)
+        variables.append(Variable("chambers", (i,), low, high, 0.3 * count + 1, count))
+    turns = np.eye(3)[:, : 3 if target.base_direction is None else 1 if target.base_width is None else 0]
+    body = Body(
+        segments,
+        np.array(guess.counts),
+        np.full((1, n), guess.pressure),
+        _some_rotation(target),
+        target.points[0],
+    )
+    # flush undersides, and values within their ranges
+    values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
+    body = body.changed(variables, values)
+    aims = (Aim.of(target, segments[0].width),)
+    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns), target)
+
+
+def _turned_to_target(problem, target):
+    """The base turned about its free axes to bring the present curve nearest to the target, in closed
+    form."""
+    free, body = problem.turns.shape[1], problem.body
+    at = problem.evaluate(problem.x)
+    if at is None or not free:
+        return problem
+    points = (Curve(at.shapes[0].placed.points).evenly(PAIRS) - body.origin) @ body.rotation
+    wanted = (target.curve.evenly(PAIRS) - target.points[0]) @ body.rotation
+    moment = points.T @ wanted
+    if free == 1:
+        turn = se3.exp_rotation(
+            np.array([np.arctan2(moment[1, 2] - moment[2, 1], moment[1, 1] + moment[2, 2]), 0, 0])
+        )
+    else:
+        U, _, Vt = np.linalg.svd(moment)
+        turn = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
+    return replace(problem, body=replace(body, rotation=body.rotation @ turn))
+
+
+def _told(problem, optimum):
+    body = problem.body
+    counts = " / ".join(f"{n:.3g}" for n in body.counts)
+    return (
+        f"angles {_angles(body.segments)} deg, chambers {counts},"
+        f" {KPA_PER_MPA * body.pressures[0, 0]:.1f} kPa,"
+        f" {np.sqrt(optimum.at.misfit):.3f} mm (root mean square)"
+    )
+
+
+def _active(problem, optimum):
+    """Yields (mm that the root mean square would fall by if it were a usual step wider, that in words) of
+    each bound that the optimum sits on."""
+    at = optimum.at
+    gradient = 2 * at.residual @ at.jacobian
+    for variable, value, slope in zip(problem.variables, optimum.x, gradient):
+        if variable.bound(value) is None:
+            continue
+        step, told = USUAL.get(variable.name, (0.1, "0.1 mm"))
+        outwards = slope if variable.bound(value) == variable.low else -slope
+        saved = np.sqrt(at.misfit) - np.sqrt(max(at.misfit - max(outwards, 0.0) * step, 0.0))
+        worth = f"; {told} beyond would save {saved:.2g} mm" if saved >= WORTH_TELLING else ""
+        yield float(saved) * (saved >= WORTH_TELLING), variable.text(value) + worth
 
 
 def about_to_touch(segments: Sequence[Segment], pressure: float) -> Iterator[str]:
     """Segments whose estimated clearance the design has used up, in words."""
     for i, segment in enumerate(segments, start=1):
+        if segment.kind == PASSIVE:
+            continue
         left = gap_left(segment, pressure)
         if left < 0.02 * segment.gap:
             yield (
                 f"segment {i} clearance of facing walls (estimate: {max(left, 0.0):.2f} mm left of"
                 f" {segment.gap:.2f} mm)"
             )
-
-
-def _whole_chambers(run):
-    """Whole numbers of chambers: from the nearest ones, one chamber more or less at a time while that
-    helps."""
-    tried = {}
-
-    def attempt(counts):
-        if counts not in tried:
-            tried[counts] = run.with_counts(counts).optimised_once(real_counts=False)
-        return tried[counts]
-
-    nearest = tuple(max(1, round(n)) for n in run.problem.counts)
-    present = run.with_counts(nearest).optimised(real_counts=False)
-    enough = max(GOOD_ENOUGH * run.cost, (FINE_ENOUGH * run.problem.target.length) ** 2)
-    while present.cost > enough:
-        counts = tuple(round(n) for n in present.problem.counts)
-        around = [counts[:i] + (n + d,) + counts[i + 1 :] for i, n in enumerate(counts) for d in (-1, 1)]
-        likely = min((attempt(c) for c in around if run.allows(c)), key=lambda r: r.cost, default=present)
-        candidate = likely.optimised(real_counts=False)
-        if candidate.cost > 0.99 * present.cost:
-            break
-        present = candidate
-    return present
 
 
 def _some_rotation(target):

@@ -12,11 +12,10 @@ import numpy as np
 
 from pneunet.base.strains import RodStrains
 from pneunet.design.target.extraction import Extracted
-from pneunet.geometry.parameters import TWISTING, Segment
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
 from pneunet.reduced.rod.laws import SegmentLaw
 
 HEIGHT_WEIGHT = 0.1  # rad per mm away from the start height: decides only between equals
-OUTSIDE = 1.0  # rad per width of what the law knows that an entry lies outside of it
 
 
 @dataclass(frozen=True)
@@ -36,10 +35,10 @@ def responses(strains: RodStrains, twisting: bool) -> np.ndarray:
     return np.stack([strains.stretch, strains.frenet_curvature, twist])
 
 
-def count_for(segment: Segment, stretch: float, deformed_length: float) -> float:
+def count_for(segment: Segment, stretch: float | np.ndarray, deformed_length: float) -> np.ndarray:
     """Real number of chambers (>= 1) that makes a segment as long as asked when its active part is
     stretched."""
-    return max(1.0, (deformed_length - 2 * segment.end_wall) / stretch / segment.pitch)
+    return np.maximum(1.0, (deformed_length - 2 * segment.end_wall) / stretch / segment.pitch)
 
 
 def first_guesses(
@@ -52,35 +51,36 @@ def first_guesses(
 ) -> list[Guess]:
     """`Guess`es, best first, one for every pressure at which each piece has an entry.
 
-    prototypes: a Segment for each with its start dimensions; angles (deg) and heights
-    (mm): the grid of each piece; pressures: increasing, MPa.
+    prototypes: a Segment for each with its start dimensions; angles (deg) and heights (mm): the grid of each
+    piece; pressures: increasing, MPa.
     """
-    options = [
-        _options(piece, prototype, a, h, pressures, law)
-        for piece, prototype, a, h in zip(pieces, prototypes, angles, heights)
-    ]
+    tables: dict[tuple, tuple[list[Segment], np.ndarray]] = {}
+    best = []
+    for piece, prototype, a, h in zip(pieces, prototypes, angles, heights):
+        if prototype.kind == PASSIVE:
+            best.append([(0.0, prototype, 0.0)] * len(pressures))
+            continue
+        key = prototype, tuple(a), tuple(h)
+        if key not in tables:
+            segments = [replace(prototype, angle=float(x), chamber_height=float(y)) for x in a for y in h]
+            tables[key] = segments, responses(law.table(segments, pressures), prototype.kind == TWISTING)
+        best.append(_nearest(piece, prototype, *tables[key]))
     guesses = []
     for j, pressure in enumerate(pressures):
-        if all(entries[j] for entries in options):
-            best = [min(entries[j], key=lambda entry: entry[0]) for entries in options]
-            misfits, segments, counts = zip(*best)
-            guesses.append(Guess(float(pressure), segments, counts, sum(misfits)))
+        misfits, segments, counts = zip(*(entries[j] for entries in best))
+        if np.isfinite(sum(misfits)):
+            guesses.append(Guess(float(pressure), segments, counts, float(sum(misfits))))
     return sorted(guesses, key=lambda guess: guess.misfit)
 
 
-def _options(piece, prototype, angles, heights, pressures, law):
-    """For every pressure the list of (misfit, segment, count) of one piece."""
-    segments = [replace(prototype, angle=float(a), chamber_height=float(h)) for a in angles for h in heights]
-    found = responses(law.table(segments, pressures), prototype.kind == TWISTING)
-    entries: list[list[tuple[float, Segment, float]]] = [[] for _ in pressures]
+def _nearest(piece, prototype, segments, found):
+    """[(misfit, segment, count)] of the best entry at every pressure; misfit inf where there is none."""
+    stretch, *rates = found
+    counts = np.array([count_for(s, row, piece.length) for s, row in zip(segments, stretch)])
+    reach = stretch * counts * np.array([s.pitch for s in segments])[:, None]
     asked = piece.length * np.array([piece.curvature, piece.twist])
-    for segment, rows in zip(segments, np.moveaxis(found, 0, -1)):
-        away = (HEIGHT_WEIGHT * (segment.chamber_height - prototype.chamber_height)) ** 2
-        for pressure, options, (stretch, *rates) in zip(pressures, entries, rows):
-            if not np.isfinite(stretch):
-                continue
-            count = count_for(segment, stretch, piece.length)
-            turned = stretch * count * segment.pitch * np.array(rates)
-            outside = np.sum((OUTSIDE * law.excess(segment, pressure)) ** 2)
-            options.append((np.sum((turned - asked) ** 2) + away + outside, segment, count))
-    return entries
+    away = HEIGHT_WEIGHT * np.array([s.chamber_height - prototype.chamber_height for s in segments])
+    misfit = (reach * rates[0] - asked[0]) ** 2 + (reach * rates[1] - asked[1]) ** 2 + away[:, None] ** 2
+    misfit = np.where(np.isfinite(misfit), misfit, np.inf)
+    rows = misfit.argmin(axis=0)
+    return [(misfit[i, j], segments[i], float(counts[i, j])) for j, i in enumerate(rows)]

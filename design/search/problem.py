@@ -1,168 +1,227 @@
-"""The least-squares problem: what a vector of variables stands for, and how far its curve is from the target.
-
-The default objective pairs points at equal fractions of arc length. It bounds the paper's Eq. 27 from above,
-since a nearest point is no farther than the paired one, and unlike Eq. 27 it is not lowered by a manipulator
-that is too long.
-"""
+"""The least-squares problem: what a vector of variables stands for, how far its shapes are from what is
+wanted, and how that changes with every variable, exactly."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.left_jacobian import LeftJacobian
+from pneunet.design.search.aims import Aim
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
-from pneunet.design.target.target import Target
-from pneunet.geometry.parameters import Segment
-from pneunet.reduced.analytic.clearance import gap_left
-from pneunet.reduced.rod.centreline import Centreline, centreline
-from pneunet.reduced.rod.ends import free_pieces
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
+from pneunet.geometry.shape_numbers import SHAPE
+from pneunet.reduced.analytic.clearance import gap_left_and_slopes
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.piece_slopes import (
+    FIELD_AT,
+    FIELDS,
+    OF_LAWS,
+    cell_states,
+    cells_length_by,
+    piece_twists,
+)
+from pneunet.reduced.rod.placing import Placed, PlacedRod
+from pneunet.reduced.rod.states import StatesWithSlopes
 
-PAIRED, EQ27 = "paired", "eq27"
-OBJECTIVES = (PAIRED, EQ27)
-PAIRS = 101
-SPACING = 2.0  # mm between the samples of a trial's centreline
-STEP = 1e-5  # of a variable's range, for differences
-#: mm of misfit per mm that facing walls would overlap: contact is not in the law, so it is not designed into
+#: mm of misfit per mm that facing walls would overlap: contact is not designed into
 TOUCH = 5.0
 BEYOND = 20.0  # mm of misfit per width of what the law knows that a segment lies outside of it
-#: mm of misfit per range that a dimension leaves its start by: decides where the target does not
+#: mm of misfit per large change that a dimension leaves its start by: decides where the target does not
 PREFERENCE = 0.02
 
 
-class Trial:
-    """What a vector of variables stands for: segments, real counts of chambers, pressure and base
-    rotation."""
+@dataclass(frozen=True, eq=False)
+class Body:
+    """segments (chambers 1) with real numbers of chambers (n,), at pressures (aims, n) in MPa, and the base's
+    rotation (3, 3) and origin (3,), mm."""
 
-    def __init__(self, problem: "Problem", variables: Sequence[Variable], x: np.ndarray) -> None:
-        changes: list[dict] = [{} for _ in problem.prototypes]
-        self.counts = np.array(problem.counts, float)
-        self.pressure = problem.pressure
-        for variable, value in zip(variables, x):
-            if variable.segment is None:
-                self.pressure = float(value)
-            elif variable.name == "chambers":
-                self.counts[variable.segment] = value
-            else:
-                changes[variable.segment][variable.name] = float(value)
-        self.segments = [replace(s, **change) for s, change in zip(problem.prototypes, changes)]
-        self.rotation = problem.rotation @ se3.exp_rotation(problem.turns @ x[len(variables) :])
+    segments: tuple[Segment, ...]
+    counts: np.ndarray
+    pressures: np.ndarray
+    rotation: np.ndarray
+    origin: np.ndarray
 
-    def centreline(self, law: SegmentLaw, base_point: np.ndarray) -> Centreline:
-        """The Centreline from base_point (3,), mm."""
-        pieces = free_pieces(self.segments, law.each(self.segments, self.pressure), self.counts)
-        return centreline(*pieces, SPACING, se3.make_pose(self.rotation, base_point))
+    @property
+    def base_pose(self) -> np.ndarray:
+        """(4, 4)"""
+        return se3.make_pose(self.rotation, self.origin)
+
+    def value(self, variable: Variable) -> float:
+        """That of a Variable."""
+        i = variable.segments[0]
+        if variable.name == "chambers":
+            return float(self.counts[i])
+        if variable.name == "pressure":
+            return float(self.pressures[variable.aims[0], i])
+        return float(getattr(self.segments[i], variable.name))
+
+    def changed(self, variables: Sequence[Variable], x: np.ndarray) -> "Body":
+        """With the values x (n,) of variables; InputError where that cannot be built."""
+        counts, pressures = self.counts.copy(), self.pressures.copy()
+        changes: list[dict] = [{} for _ in self.segments]
+        for variable, value in zip(variables, x.tolist()):
+            for i in variable.segments:
+                if variable.name == "chambers":
+                    counts[i] = value
+                elif variable.name == "pressure":
+                    pressures[list(variable.aims), i] = value
+                else:
+                    changes[i][variable.name] = value
+        segments = tuple(replace(s, **change) if change else s for s, change in zip(self.segments, changes))
+        return replace(self, segments=segments, counts=counts, pressures=pressures)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One shape of a Body and how it changes: placed stations; turns, moves (s, 3, n, fields): their
+    derivatives by FIELDS of every segment; states: of the cells."""
+
+    placed: Placed
+    turns: np.ndarray
+    moves: np.ndarray
+    states: StatesWithSlopes
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A Body with its Shapes; residual (m,) and jacobian (m, n) as least squares take them; misfit: the part
+    of the residual's squared norm that is the mean squared distance, mm^2."""
+
+    body: Body
+    shapes: tuple[Shape, ...]
+    residual: np.ndarray
+    jacobian: np.ndarray
+    misfit: float
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
-    """The problem around a state: prototypes (chambers 1), real counts, pressure, base rotation and its
-    freedom.
+    """The problem around a Body: variables, then turns of the base about axes (the columns of `turns` (3, t),
+    in base axes) are what is sought. everything: derivatives by fields that do not vary are wanted too."""
 
-    turns (3, m): the columns are the axes, in base axes, about which the base may turn: 3 when it is free, 1
-    when its direction is fixed, none when it is fixed altogether.
-    """
-
-    target: Target
+    aims: tuple[Aim, ...]
     pieces: tuple[Extracted, ...]
     law: SegmentLaw
-    objective: str
-    prototypes: tuple[Segment, ...]
-    counts: tuple[float, ...]
-    pressure: float
-    rotation: np.ndarray
+    variables: tuple[Variable, ...]
+    body: Body
     turns: np.ndarray
+    everything: bool = False
 
-    def residual(self, trial: Trial) -> np.ndarray:
-        """Residual vector in mm whose squared norm is the cost in mm^2."""
-        target = self.target
-        line = trial.centreline(self.law, target.points[0])
-        if self.objective == EQ27:
-            misfits = [
-                (Curve(line.points).nearest(target.points) - target.points) / np.sqrt(len(target.points))
-            ]
-        else:
-            misfits = [self._paired(line)]
-        misfits += [self._unseen_twists(trial), TOUCH * walls_overlap(trial.segments, trial.pressure)]
-        misfits += [BEYOND * self.law.excess(segment, trial.pressure) for segment in trial.segments]
-        return np.concatenate([m.ravel() for m in misfits])
+    @cached_property
+    def x(self) -> np.ndarray:
+        """What is sought, at the Body."""
+        return np.array([self.body.value(v) for v in self.variables] + [0.0] * self.turns.shape[1])
 
-    def _paired(self, line):
-        """Points at equal fractions of arc length; with frames also the body's edges, half a width off the
-        line."""
-        target = self.target
-        own = line.arc_length
-        frames = line.at(np.interp(np.linspace(0, own[-1], PAIRS), own, line.s))
-        misfit = [frames[:, :3, 3] - target.curve.evenly(PAIRS)]
-        if target.frames is not None:
-            s = target.curve.arc_lengths
-            nearest = np.abs(s[:, None] - np.linspace(0, s[-1], PAIRS)).argmin(axis=0)
-            edges = self.prototypes[0].width / 2 * (frames[:, :3, 1:3] - target.frames[nearest][:, :, 1:3])
-            misfit.append(edges.reshape(PAIRS, 6))
-        return np.hstack(misfit) / np.sqrt(PAIRS)
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of x: lowest, highest, large changes."""
+        free, (v, inf) = self.turns.shape[1], (self.variables, np.inf)
+        low, high = [a.low for a in v] + [-inf] * free, [a.high for a in v] + [inf] * free
+        return np.array(low), np.array(high), np.array([a.scale for a in v] + [1.0] * free)
 
-    def _unseen_twists(self, trial):
-        """Misfit at the body's edge, mm, of twists that no point of the target shows."""
-        misfits = [0.0]
-        for piece, segment, count in zip(self.pieces, trial.segments, trial.counts):
-            if not piece.twist_seen:
-                turned = self.law.each([segment], trial.pressure).k[0, 0] * count * segment.pitch
-                misfits.append(segment.width / 2 * (turned - piece.twist * piece.length))
-        return np.array(misfits)
+    def moved(self, x: np.ndarray) -> Body:
+        """The Body that x stands for; InputError where it cannot be built."""
+        count = len(self.variables)
+        body = self.body.changed(self.variables, x[:count])
+        return replace(body, rotation=body.rotation @ se3.exp_rotation(self.turns @ x[count:]))
 
-
-def walls_overlap(segments: Sequence[Segment], pressure: float) -> np.ndarray:
-    """By how much (mm) facing walls of each segment are expected to pass through each other; 0 where a gap
-    stays."""
-    return np.array([max(0.0, -gap_left(s, pressure)) for s in segments])
-
-
-class Calls:
-    """Residual and its differences for least_squares, counted; where the law has no equilibrium no step is
-    taken."""
-
-    def __init__(
-        self, problem: Problem, variables: Sequence[Variable], scale: np.ndarray, high: np.ndarray
-    ) -> None:
-        self.problem, self.variables, self.scale, self.high = problem, variables, scale, high
-        self.preferred = [i for i, v in enumerate(variables) if v.start is not None]
-        self.count, self.size = 0, 0
-
-    def attempt(self, x: np.ndarray) -> np.ndarray | None:
-        """The residual (m,), or None where there is no such body or no equilibrium."""
-        self.count += 1
+    def evaluate(self, x: np.ndarray) -> Evaluation | None:
+        """The Evaluation at x, or None where there is no such body or no equilibrium."""
         try:
-            misfit = self.problem.residual(Trial(self.problem, self.variables, x))
+            body = self.moved(x)
+            shapes = tuple(self._shape(body, i, aim) for i, aim in enumerate(self.aims))
         except (InputError, ConvergenceError):
             return None
-        away = [(x[i] - self.variables[i].start) / self.scale[i] for i in self.preferred]
-        out = np.concatenate([misfit, PREFERENCE * np.array(away)])
-        self.size = out.size
+        turned = np.concatenate([self.turns @ x[len(self.variables) :], np.zeros(3)])
+        omega = self.body.rotation @ LeftJacobian(turned[None]).matrix[0, :3, :3] @ self.turns
+        parts = [self._misfits(i, shape, body, omega) for i, shape in enumerate(shapes)]
+        misfit = sum(float(r @ r) for r, _ in parts) / len(parts)
+        parts = [(r / np.sqrt(len(shapes)), J / np.sqrt(len(shapes))) for r, J in parts]
+        parts += [self._doubts(i, shape) for i, shape in enumerate(shapes)]
+        parts += [self._unseen_twists(body, shapes[0]), self._touching(body), self._preferences(x)]
+        residual, jacobian = np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
+        return Evaluation(body, shapes, residual, jacobian, misfit)
+
+    def _shape(self, body, number, aim):
+        n, pressures = len(body.segments), body.pressures[number]
+        names = SHAPE if self.everything else {v.name for v in self.variables}
+        states = cell_states(self.law, body.segments, pressures, names)
+        by_laws = states.strains_by[:, :, : len(OF_LAWS)]
+        twists, by = piece_twists(body.segments, states.strains, by_laws, body.counts)
+        placed = aim.stations(PlacedRod(twists, body.base_pose))
+        by, s = by.reshape(n, 18, -1), len(placed.poses)
+        turns, moves = (
+            np.moveaxis(a.reshape(3 * s, n, 18).swapaxes(0, 1) @ by, 0, 1).reshape(s, 3, n, -1)
+            for a in (placed.turns, placed.moves)
+        )
+        return Shape(placed, turns, moves, states)
+
+    def columns(self, by_fields: np.ndarray, aim: int) -> np.ndarray:
+        """(..., n) derivatives by x, those of the base 0, from those (..., segments, fields) of one shape."""
+        out = np.zeros((*by_fields.shape[:-2], len(self.x)))
+        for j, v in enumerate(self.variables):
+            if v.name != "pressure" or aim in v.aims:
+                out[..., j] = by_fields[..., list(v.segments), FIELD_AT[v.name]].sum(axis=-1)
         return out
 
-    def residual(self, x: np.ndarray) -> np.ndarray:
-        """The residual (m,); where there is none, numbers too large to be taken."""
-        out = self.attempt(x)
-        return np.full(self.size, self.problem.target.length) if out is None else out
+    def _misfits(self, number, shape, body, omega):
+        aim, placed = self.aims[number], shape.placed
+        turns, moves = self.columns(shape.turns, number), self.columns(shape.moves, number)
+        if omega.shape[1]:
+            count = len(self.variables)
+            turns[:, :, count:] = omega
+            moves[:, :, count:] = -se3.hat(placed.points - body.origin) @ omega
+        return aim.misfit(placed), aim.slopes(placed, turns, moves)
 
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """One-sided differences, away from the upper bound or from where there is no equilibrium."""
-        at = self.residual(x)
-        columns = []
-        for i, scale in enumerate(self.scale):
-            step = STEP * scale if x[i] + STEP * scale <= self.high[i] else -STEP * scale
-            moved = self._moved(x, i, step)
-            if moved is None:
-                step = -step
-                moved = self._moved(x, i, step)
-            columns.append(np.zeros(at.size) if moved is None else (moved - at) / step)
-        return np.column_stack(columns)
+    def _doubts(self, number, shape):
+        """BEYOND times how far each segment lies outside what the law knows."""
+        states = shape.states
+        segment, what = np.nonzero(states.excess)
+        by = np.zeros((len(segment), len(states.excess), len(FIELDS)))
+        by[np.arange(len(segment))[:, None], segment[:, None], OF_LAWS] = states.excess_by[
+            segment, what, : len(OF_LAWS)
+        ]
+        return BEYOND * states.excess[segment, what], BEYOND * self.columns(by, number)
 
-    def _moved(self, x, i, step):
-        moved = x.copy()
-        moved[i] += step
-        return self.attempt(moved)
+    def _unseen_twists(self, body, shape):
+        """Misfit at the body's edge, mm, of twists that no point of the target shows."""
+        rows, slopes = [], []
+        for i, (piece, segment) in enumerate(zip(self.pieces, body.segments)):
+            if piece.kind == TWISTING and not piece.twist_seen:
+                k1, count = shape.states.strains[i, 3], body.counts[i]
+                by = np.zeros((len(body.segments), len(FIELDS)))
+                half, length = segment.width / 2, count * segment.pitch
+                turn = k1 * length - piece.twist * piece.length
+                by[i] = half * k1 * cells_length_by(segment, count)
+                by[i, OF_LAWS] += half * length * shape.states.strains_by[i, 3, : len(OF_LAWS)]
+                by[i, FIELD_AT["width"]] += turn / 2
+                rows.append(half * turn)
+                slopes.append(self.columns(by, 0))
+        return np.array(rows), np.array(slopes).reshape(len(rows), len(self.x))
+
+    def _touching(self, body):
+        """TOUCH times by how much facing walls of each segment are expected to pass through each other."""
+        rows, slopes = [], []
+        for number, pressures in enumerate(body.pressures):
+            for i, (segment, pressure) in enumerate(zip(body.segments, pressures)):
+                if segment.kind == PASSIVE:
+                    continue
+                left, by_left = gap_left_and_slopes(segment, pressure)
+                if left < 0:
+                    by = np.zeros((len(body.segments), len(FIELDS)))
+                    by[i, OF_LAWS] = by_left
+                    rows.append(-TOUCH * left)
+                    slopes.append(-TOUCH * self.columns(by, number))
+        return np.array(rows), np.array(slopes).reshape(len(rows), len(self.x))
+
+    def _preferences(self, x):
+        drawn = [(j, v.start, PREFERENCE / v.scale) for j, v in enumerate(self.variables) if v.start]
+        slopes = np.zeros((len(drawn), len(x)))
+        for row, (j, _, weight) in zip(slopes, drawn):
+            row[j] = weight
+        return np.array([weight * (x[j] - start) for j, start, weight in drawn]), slopes

@@ -1,6 +1,6 @@
-"""The design space: start dimensions, what varies in each kind of segment, ranges that grow to castable
-limits."""
+"""The design space: start dimensions, what varies in each kind of segment, and how far it may."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,105 +9,98 @@ from pneunet.base.errors import InputError
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import BENDING, Target
-from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
+from pneunet.geometry.parameters import ONE_SIDED, PASSIVE, TWISTING, Segment
 
 Range = tuple[float, float]
-AT_BOUND = 1e-3  # of a variable's range
+AT_BOUND = 1e-6  # of a variable's range
 #: start dimensions, mm, where they differ from Segment's own: castable and of the paper's magnitudes
 START: dict[str, dict] = {
     ONE_SIDED: {},
     TWISTING: {"chamber_height": 5.5, "cavity_floor": 0.5, "gap": 2.0},
 }
-#: start range and castable limits, mm and degrees, of what varies by default
-RANGES: dict[str, dict[str, tuple[Range, Range]]] = {
+#: castable limits, mm and degrees, of what varies by default, and what counts as a large change
+RANGES: dict[str, dict[str, tuple[Range, float]]] = {
     ONE_SIDED: {
-        "angle": ((45, 135), (30, 150)),
-        "chamber_height": ((3, 5), (2, 8)),
-        "base_thickness": ((1.5, 3), (1, 5)),
-        "wall": ((1, 1.5), (0.8, 2)),
-        "gap": ((1, 2), (1, 3)),  # half a gap of channel must fit into the end margin
+        "angle": ((30, 150), 90.0),
+        "chamber_height": ((2, 8), 2.0),
+        "base_thickness": ((1, 5), 1.5),
+        "wall": ((1, 2), 0.5),
+        "gap": ((1, 3), 1.0),
+        "end_margin": ((2, 4), 1.0),  # half a gap of channel must fit into it
     },
     TWISTING: {
-        "angle": ((45, 135), (30, 150)),
-        "chamber_height": ((4, 6), (2, 8)),
-        "gap": ((2, 3), (1, 3)),
+        "angle": ((30, 150), 90.0),
+        "chamber_height": ((2, 8), 2.0),
+        "gap": ((1, 3), 1.0),
+        "end_margin": ((2, 4), 1.0),
     },
+    PASSIVE: {"plain_length": ((3, 500), 5.0), "base_thickness": ((1, 5), 1.5)},
 }
 UNITS = {"pressure": (" kPa", KPA_PER_MPA), "angle": (" deg", 1.0), "chambers": ("", 1.0)}
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A design variable of one segment (None: of all) with its range, which may grow to its limits."""
+    """A design variable of some segments: its field (reduced.rod.piece_slopes.FIELDS), range, what counts as
+    a large change, and the value it is drawn to where the target does not decide; of a pressure, the aims
+    that it is meant for."""
 
     name: str
-    segment: int | None
-    value: float
+    segments: tuple[int, ...]
     low: float
     high: float
-    least: float
-    most: float
-    start: float | None = None  # a dimension's preferred value
-
-    @property
-    def scale(self) -> float:
-        """What counts as a large change."""
-        return max(self.high - self.low, 1e-3 * abs(self.value))
-
-    @property
-    def bound(self) -> float | None:
-        """The end of the range that the value sits on, or None."""
-        for end in (self.low, self.high):
-            if abs(self.value - end) <= AT_BOUND * self.scale:
-                return end
-        return None
-
-    @property
-    def grown(self) -> "Variable":
-        """With a wider range where the value sits on a bound that may grow; otherwise the same."""
-        low, high = self.low, self.high
-        if self.bound == low and low > self.least:
-            low = max(self.least, low - self.scale)
-        elif self.bound == high and high < self.most:
-            high = min(self.most, high + self.scale)
-        return replace(self, low=low, high=high)
+    scale: float
+    start: float | None = None
+    aims: tuple[int, ...] = (0,)
 
     @property
     def title(self) -> str:
-        return self.name if self.segment is None else f"segment {self.segment + 1} {self.name}"
+        """As users read it; of several segments at once, without their numbers."""
+        alone = len(self.segments) == 1 and self.name != "pressure"
+        return f"segment {self.segments[0] + 1} {self.name}" if alone else self.name
 
-    @property
-    def text(self) -> str:
-        """The bound that the value sits on, in words; "" on none."""
-        if self.bound is None:
-            return ""
+    def bound(self, value: float) -> float | None:
+        """The end of the range that a value sits on, or None."""
+        for end in (self.low, self.high):
+            if abs(value - end) <= AT_BOUND * (self.high - self.low):
+                return end
+        return None
+
+    def text(self, value: float) -> str:
+        """A value on a bound, in words."""
         unit, factor = UNITS.get(self.name, (" mm", 1.0))
-        side = "lower" if self.bound == self.low else "upper"
-        shown = round(self.value) if self.name == "chambers" else factor * self.bound
+        side = "lower" if self.bound(value) == self.low else "upper"
+        shown = round(value) if self.name == "chambers" else factor * value
         return f"{self.title} = {shown:.4g}{unit} ({side} bound)"
 
 
 def prototype(target: Target, piece: Extracted) -> Segment:
     """The Segment with a piece's start dimensions: material and shared dimensions are the same for all
     pieces."""
-    kind = TWISTING if piece.kind == TWISTING else ONE_SIDED
+    kind = piece.kind if piece.kind in (TWISTING, PASSIVE) else ONE_SIDED
+    of_chambers = TWISTING if kind == TWISTING else ONE_SIDED
     try:
-        return Segment(kind, 90.0, 1, **(START[kind] | target.start), material=target.material)
+        segment = Segment(
+            of_chambers, 90.0, 1, **(START[of_chambers] | target.start), material=target.material
+        )
+        segment = replace(segment, roll=round(piece.roll))
+        return segment.plain(piece.length) if kind == PASSIVE else segment
     except InputError as error:
         raise InputError(f"[segment] (start dimensions of the {kind} segments): {error}") from None
 
 
-def limits(target: Target, piece: Extracted, segment: Segment) -> dict[str, tuple[Range, Range]]:
-    """{name: (start range, limits)} of what varies in one segment; the user's bounds are limits at once."""
+def limits(target: Target, piece: Extracted, segment: Segment) -> dict[str, tuple[Range, float]]:
+    """{name: (range, large change)} of what varies in one segment."""
     ranges = RANGES[segment.kind]
-    if target.vary is not None:
-        ranges = {"angle": ranges["angle"]} | {name: (bounds, bounds) for name, bounds in target.vary.items()}
+    if target.vary is not None and segment.kind != PASSIVE:
+        ranges = {name: ranges[name] for name in ("angle", "end_margin")}
+        ranges |= {name: ((low, high), max(high - low, 1e-6)) for name, (low, high) in target.vary.items()}
         if segment.kind == TWISTING:
             ranges.pop("base_thickness", None)
         _check_vary(target.vary, segment)
-    if piece.kind == BENDING:
-        ranges = {name: both for name, both in ranges.items() if name != "angle"}
-    return ranges
+    given = "end_margin" in target.start and "end_margin" not in (target.vary or {})
+    dropped = ("angle",) * (piece.kind == BENDING) + ("end_margin",) * given
+    return {name: both for name, both in ranges.items() if name not in dropped}
 
 
 def _check_vary(vary, segment):
@@ -119,7 +112,32 @@ def _check_vary(vary, segment):
                 raise InputError(f"[vary]: {error}") from None
 
 
-def grid(limits: tuple[Range, Range] | None, fixed: float, step: float) -> np.ndarray:
-    """Values (n,) about `step` apart over a start range of `limits`; what does not vary has one value."""
-    low, high = limits[0] if limits else (fixed, fixed)
+def variables_of(
+    target: Target, pieces: Sequence[Extracted], segments: Sequence[Segment], flush: bool
+) -> list[Variable]:
+    """Of the dimensions of all segments. flush: the undersides of all but twisting ones in one plane."""
+    found, base = [], []
+    for i, (piece, segment) in enumerate(zip(pieces, segments)):
+        usual = prototype(target, piece)
+        for name, ((low, high), scale) in limits(target, piece, segment).items():
+            start = None if name == "angle" else float(np.clip(getattr(usual, name), low, high))
+            if high <= low:
+                continue
+            if name == "base_thickness" and flush:
+                base.append((i, low, high, scale, start))
+            elif name != "base_thickness" or segment.kind != PASSIVE:
+                found.append(Variable(name, (i,), float(low), float(high), scale, start))
+    if any(segments[i].kind == ONE_SIDED for i, *_ in base):
+        members, lows, highs, scales, starts = zip(*base)
+        found.append(Variable("base_thickness", members, max(lows), min(highs), scales[0], starts[0]))
+    return found
+
+
+def grid(limits: tuple[Range, float] | None, fixed: float, step: float) -> np.ndarray:
+    """Values (n,) about `step` apart, half a large change to either side of `fixed` within the range; what
+    does not vary has one value."""
+    if limits is None:
+        return np.array([fixed])
+    (least, most), scale = limits
+    low, high = max(least, fixed - scale / 2), min(most, fixed + scale / 2)
     return np.linspace(low, high, max(1, round((high - low) / step)) + 1) if high > low else np.array([low])

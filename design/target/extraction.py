@@ -7,7 +7,7 @@ segment bends, and the twist of a straight piece is the angle about it between t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -17,7 +17,7 @@ from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import PER_MM_PER_M
-from pneunet.design.target.target import BENDING, HELICAL, Piece, Target
+from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, Piece, Target
 from pneunet.geometry.parameters import TWISTING
 
 FIT_POINTS = 31
@@ -41,8 +41,8 @@ class Extracted:
     """What one segment is to do, per deformed length: length mm, twist (tau or torsion) rad/mm, curvature
     1/mm.
 
-    twist_seen: the points (or frames) determine the twist. fit_rms: mm between the points and the piece of
-    uniform rates. note: what had to be assumed.
+    roll in degrees, as a Piece's. twist_seen: the points (or frames) determine the twist. fit_rms: mm between
+    the points and the piece of uniform rates. note: what had to be assumed.
     """
 
     kind: str
@@ -52,6 +52,7 @@ class Extracted:
     fit_rms: float
     twist_seen: bool = True
     note: str = ""
+    roll: float = 0.0
 
     @property
     def strains(self) -> RodStrains:
@@ -94,8 +95,8 @@ def fit_arc(points: np.ndarray, kind: str, curvature: float | None = None, twist
     length, wanted = curve.length, curve.evenly(FIT_POINTS)
     s = np.linspace(0, length, FIT_POINTS)
     weights = np.ones(FIT_POINTS)
-    given_curvature = 0.0 if kind == TWISTING else curvature
-    given_twist = 0.0 if kind in (TWISTING, BENDING) else twist
+    given_curvature = 0.0 if kind in (TWISTING, PASSIVE) else curvature
+    given_twist = 0.0 if kind in (TWISTING, PASSIVE, BENDING) else twist
 
     def rates_of(x):
         x = list(x / length)
@@ -143,9 +144,11 @@ def extract(target: Target, pieces: Sequence[Piece]) -> list[Extracted]:
     for piece, low, high in zip(pieces, ends[:-1], ends[1:]):
         within = (own > low + 1e-6 * ends[-1]) & (own < high - 1e-6 * ends[-1])
         stations = np.concatenate([[low], own[within], [high]])
-        arcs.append(fit_arc(target.curve.at(stations), piece.kind, piece.curvature, piece.twist))
+        arc = fit_arc(target.curve.at(stations), piece.kind, piece.curvature, piece.twist)
+        back = se3.exp_rotation(np.array([-np.radians(piece.roll), 0.0, 0.0]))  # to the body's frame
+        arcs.append(replace(arc, start=arc.start @ back, end=arc.end @ back))
     out = [
-        Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p))
+        Extracted(p.kind, p.length, arc.twist, arc.curvature, arc.rms, note=_kept(p), roll=p.roll)
         for p, arc in zip(pieces, arcs)
     ]
     for run in _runs(pieces):

@@ -3,29 +3,36 @@
 Every bad input is one line that names the key and the fix.
 """
 
-import logging
-import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError
+from pneunet.base.curve import Curve
+from pneunet.base.errors import InputError, located
 from pneunet.base.files.kinds import TARGET, read_tables
-from pneunet.base.files.schemas import POINT
-from pneunet.base.files.text import read_numbers_table
-from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown
+from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown, vector
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
-from pneunet.base.quantities import Checked, quantities, quantity
+from pneunet.base.quantities import Checked, quantities, quantity, shown
 from pneunet.base.strains import helix_frenet
-from pneunet.base.units import KPA_PER_MPA, LENGTHS, MPA_PER_KPA
-from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Piece, Target
+from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, TO_INTERNAL
+from pneunet.design.target.casting import RANGES, Casting
+from pneunet.design.target.shapes import TargetShape, TipPoints, guide_to
+from pneunet.design.target.table import PointsTable, read_points
+from pneunet.design.target.target import (
+    BENDING,
+    HELICAL,
+    PASSIVE,
+    PRESSURE_LIMIT,
+    Piece,
+    SplitOptions,
+    Target,
+)
+from pneunet.design.target.wrapfile import wrapped
 from pneunet.geometry.parameters import TWISTING, Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
-log = logging.getLogger(__name__)
-FRAME_COLUMNS = ("t1x", "t1y", "t1z", "t2x", "t2y", "t2z")
 
 #: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
 #: found, and a bottom layer is no variable of the inverse design
@@ -49,8 +56,9 @@ def read_target(path: str | Path) -> Target:
         path = SHIPPED / f"{path}.toml"
     if path.suffix.lower() == ".toml":
         return _from_toml(path)
-    points, frames = _read_points(path)
-    return _target(str(path), points=points, frames=frames, name=path.stem, source=path.name)
+    found = read_points(path)
+    given = {"points": found.points, "frames": found.frames, "weights": found.weights}
+    return _target(str(path), **given, name=path.stem, source=path.name)
 
 
 def _target(where, **values):
@@ -60,67 +68,12 @@ def _target(where, **values):
         raise InputError(f"{where}: {error}") from None
 
 
-# ---- CSV
-
-
-#: a column's name, with or without the unit that is said of it or below it
-_COLUMN = re.compile(r"(t[12])?[xyz]", re.IGNORECASE)
-_NAMED = re.compile(r"(\w+?)[\s_]*(?:in\s+|[(\[])?\s*(mm|cm|m|um|µm|inch|in)?\s*[)\]]?", re.IGNORECASE)
-
-
-def _read_points(path):
-    """(points (n, 3), frames (n, 3, 3) or None) of a CSV: named columns, or three bare columns of numbers."""
-    table = read_numbers_table(path)
-    if not table.header and table.width != 3:
-        raise InputError(f"{path}: a CSV without a header has 3 columns x, y, z in mm, not {table.width}")
-    values, units, left = {}, {}, []
-    for i, name in enumerate(table.header or POINT):
-        found = _NAMED.fullmatch(f"{name} {table.units[i]}".strip() if table.units else name.strip())
-        if not found or not _COLUMN.fullmatch(found[1]):
-            left.append(name)
-            continue
-        key = found[1].lower()
-        if key in values:
-            raise InputError(f"{path}: two columns '{key}': rename or delete one")
-        values[key] = table.numbers(i)
-        if len(key) == 1:
-            units[key] = (found[2] or "mm").lower().replace("µ", "u")
-    for key in "xyz":
-        if key not in values:
-            raise InputError(
-                f"{path}: column '{key}_mm' is missing: there are {', '.join(table.header)[:200]}"
-            )
-    if len(set(units.values())) > 1:
-        given = ", ".join(f"{key} in {unit}" for key, unit in units.items())
-        raise InputError(f"{path}: {given}: write all three in the same unit")
-    if any(left):
-        log.info(f"{path}: columns that are not used: {', '.join(filter(None, left))[:200]}")
-    points = LENGTHS[units["x"]] * np.column_stack([values[c] for c in "xyz"])
-    return points, _frames_of(values, path) if "t1x" in values or "t2x" in values else None
-
-
-def _frames_of(values, where):
-    missing = [c for c in FRAME_COLUMNS if c not in values]
-    if missing:
-        raise InputError(f"{where}: column '{missing[0]}' is missing: frames need {', '.join(FRAME_COLUMNS)}")
-    t1 = np.column_stack([values[c] for c in FRAME_COLUMNS[:3]])
-    t2 = np.column_stack([values[c] for c in FRAME_COLUMNS[3:]])
-    return np.stack([t1, t2, np.cross(t1, t2)], axis=2)
-
-
-# ---- TOML
-
-POINT_KEYS = ("target", "points", "points_mm", "frames")
+#: one of these says the curve
+CURVES = ("points", "points_mm", "wrap")
+SHAPE_KEYS = (*CURVES, "frames", "weights", "pressure_kPa")
 KEYS = (
-    "name",
-    *POINT_KEYS,
-    "pressure_kPa",
-    "pressure_range_kPa",
-    "piece",
-    "base",
-    "material",
-    "segment",
-    "vary",
+    *("name", "target", *SHAPE_KEYS, "pressure_range_kPa", "gravity_m_per_s2", "shape", "tip_points"),
+    *("piece", "base", "material", "casting", "segment", "split", "vary"),
 )
 
 
@@ -131,23 +84,48 @@ def _from_toml(path):
     if "target" in table:
         table, folder = _on_shipped(table, path)
     where = str(path)
-    points, frames = _toml_points(table, folder, where)
-    direction, width = _base(table.get("base", {}), f"{where} [base]")
+    shapes = _tables(table, "shape", where)
+    if shapes and not _says_curve(table):  # the first shape is the one that is split
+        table = table | shapes.pop(0)
+    tip = _tip(table, folder, where)
+    base = dict(table.get("base", {}))
+    point, (direction, width) = _base_point(base, where), _base(base, f"{where} [base]")
+    pieces = _pieces(table, where)
+    if _says_curve(table) or tip is None:
+        if point is not None:
+            raise InputError(
+                f"{where} [base]: 'point_mm' goes with tip_points alone: else the curve begins there"
+            )
+        curve = _curve(table, folder, where)
+    else:
+        curve, pieces = _guide(tip, pieces, point, direction, where)
+    pressure_range, pressures = _pressure(table, where)
     material = table.get("material")
     return _target(
         where,
-        points=points,
-        frames=frames,
+        points=curve.points,
+        frames=curve.frames,
+        weights=curve.weights,
         name=str(table.get("name", path.stem)),
         source=path.name,
-        pieces=_pieces(table.get("piece", []), where),
+        pieces=pieces,
         base_direction=direction,
         base_width=width,
-        pressure_range=_pressure_range(table, where),
+        pressure_range=pressure_range,
+        pressures=pressures,
+        gravity=_gravity(table, where),
+        shapes=tuple(_shape(row, folder, f"{where} [[shape]] {i}") for i, row in enumerate(shapes, start=1)),
+        tip=tip,
         material=PAPER_TWISTING if material is None else material_from_table(material, f"{where} [material]"),
+        casting=_casting(table.get("casting", {}), f"{where} [casting]"),
         start=_start(table.get("segment", {}), f"{where} [segment]"),
+        split=from_table(SplitOptions, table.get("split", {}), f"{where} [split]"),
         vary=_vary(table["vary"], f"{where} [vary]") if "vary" in table else None,
     )
+
+
+def _says_curve(table):
+    return any(key in table for key in CURVES)
 
 
 def _on_shipped(table, path):
@@ -157,7 +135,7 @@ def _on_shipped(table, path):
     if table["target"] not in names:
         known = ", ".join(names) or "none in this installation: give points instead"
         raise InputError(f"{path}: target = '{table['target']}' is not shipped: shipped are {known}")
-    if "points" in table or "points_mm" in table:
+    if _says_curve(table):
         raise InputError(f"{path}: 'target' and 'points' exclude each other: give one")
     shipped = read_toml(SHIPPED / f"{table['target']}.toml")
     own = {key: value for key, value in table.items() if key != "target"}
@@ -166,53 +144,147 @@ def _on_shipped(table, path):
     return shipped | own, SHIPPED
 
 
-def _toml_points(table, folder, where):
-    if ("points" in table) == ("points_mm" in table):
+def _curve(table, folder, where):
+    """The PointsTable that `points`, `points_mm` or [wrap] gives, with frames and weights from keys of their
+    own."""
+    if sum(key in table for key in CURVES) != 1:
         raise InputError(
-            f"{where}: give one of 'points' (a CSV file), 'points_mm' (a list of [x, y, z]) or 'target'"
+            f"{where}: give one of 'points' (a CSV file), 'points_mm' (a list of [x, y, z]), [wrap],"
+            " 'tip_points' or 'target'"
         )
     if "points" in table:
         if not isinstance(table["points"], str):
             raise InputError(f"{where}: 'points' names a CSV file; write a list as 'points_mm'")
-        points, frames = _read_points(folder / table["points"])
+        curve = read_points(folder / table["points"])
+    elif "wrap" in table:
+        curve = PointsTable(wrapped(table["wrap"], folder, f"{where} [wrap]"))
     else:
-        points, frames = _array(table["points_mm"], "points_mm", where, 2), None
+        curve = PointsTable(_array(table["points_mm"], "points_mm", where, 2))
     if "frames" in table:
-        frames = np.swapaxes(_array(table["frames"], "frames", where, 3), 1, 2)
-    return points, frames
+        curve = replace(curve, frames=np.swapaxes(_array(table["frames"], "frames", where, 3), 1, 2))
+    if "weights" in table:
+        curve = replace(curve, weights=_array(table["weights"], "weights", where, 1))
+    return curve
+
+
+def _tables(table, key, where):
+    """The tables of an array of tables, as a list."""
+    rows = table.get(key, [])
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise InputError(f"{where}: {key}s are written [[{key}]], with double brackets")
+    return list(rows)
+
+
+def _shape(row, folder, where):
+    """A [[shape]]: a curve with its pressures."""
+    refuse_unknown(row, SHAPE_KEYS, where)
+    if "pressure_kPa" not in row:
+        raise InputError(
+            f"{where}: key 'pressure_kPa' is missing: at which pressure is the body to be there?"
+        )
+    one, several = _pressure(row, where)
+    curve = _curve(row, folder, where)
+    with located(where):
+        return TargetShape(curve.points, several or one[:1], curve.frames, curve.weights)
+
+
+def _tip(table, folder, where):
+    """TipPoints of the file that `tip_points` names, None without."""
+    if "tip_points" not in table:
+        return None
+    if not isinstance(table["tip_points"], str):
+        raise InputError(
+            f"{where}: 'tip_points' names a CSV file with columns pressure_kPa, x_mm, y_mm, z_mm"
+        )
+    file = folder / table["tip_points"]
+    found = read_points(file)
+    if found.pressures is None:
+        raise InputError(
+            f"{file}: column 'pressure_kPa' is missing: at which pressure is the tip to be there?"
+        )
+    with located(file):
+        return TipPoints(found.points, found.pressures, found.weights)
+
+
+def _guide(tip, pieces, point, direction, where):
+    """(PointsTable of weights 0, pieces) for tip points alone: an arc from the base to the farthest of them,
+    as long as the pieces together."""
+    if direction is None:
+        raise InputError(
+            f"{where} [base]: key 'direction' is missing: tip_points alone need to know where to"
+        )
+    base = np.zeros(3) if point is None else point
+    with located(where):
+        points = guide_to(tip.points, base, direction)
+    length = Curve(points).length
+    if pieces:
+        points = base + sum(p.length for p in pieces) / length * (points - base)
+    else:
+        pieces = (Piece(HELICAL, length),)
+    return PointsTable(points, weights=np.zeros(len(points))), pieces
+
+
+def _base_point(base, where):
+    """The point (3,) that [base] names, taken out of it; None without."""
+    given = base.pop("point_mm", None)
+    return None if given is None else np.array(vector(given, "point_mm", f"{where} [base]"))
+
+
+def _gravity(table, where):
+    """mm/s2"""
+    key = "gravity_m_per_s2"
+    return tuple(TO_INTERNAL["m_per_s2"] * v for v in vector(table.get(key, (0, 0, 0)), key, where))
+
+
+def _casting(table, where):
+    """The Casting of [casting]."""
+    table, given = dict(table), {}
+    for key, (name, *_) in RANGES.items():
+        if key in table:
+            given[name] = _range(table.pop(key), key, where)
+    names = table.pop("silicones", [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"{where}: 'silicones' must be a list of names, not {shown(names)}")
+    refuse_unknown(table, (*quantities(Casting), *RANGES, "silicones"), where)
+    return from_table(Casting, table, where, silicones=tuple(names), **given)
 
 
 def _array(value, key, where, dimensions):
     try:
         array = np.array(value)
         numeric = array.dtype.kind in "if" and array.ndim == dimensions
-    except ValueError:
+    except (ValueError, OverflowError):
         numeric = False
     if not numeric:
-        shape = "[x, y, z]" if dimensions == 2 else "[t1, t2, t3] of three numbers each"
+        shape = {1: "numbers", 2: "[x, y, z]", 3: "[t1, t2, t3] of three numbers each"}[dimensions]
         raise InputError(f"{where}: '{key}' must be a list of {shape}")
     return array.astype(float)
 
 
-def _pressure_range(table, where):
+def _pressure(table, where):
+    """((low, high) in MPa or None, pressures of groups in MPa or ())."""
     if "pressure_kPa" in table and "pressure_range_kPa" in table:
         raise InputError(
             f"{where}: 'pressure_kPa' (fixed) and 'pressure_range_kPa' exclude each other: give one"
         )
-    if "pressure_kPa" in table:
-        low = high = number(table["pressure_kPa"], "pressure_kPa", where)
-        key = "pressure_kPa"
-    elif "pressure_range_kPa" in table:
+    if "pressure_range_kPa" in table:
         key = "pressure_range_kPa"
-        low, high = _range(table[key], key, where)
+        values = _range(table[key], key, where)
+    elif "pressure_kPa" in table:
+        key = "pressure_kPa"
+        given = table[key]
+        values = tuple(number(v, key, where) for v in (given if isinstance(given, list) else [given]))
     else:
-        return None
-    if not 0 < low <= high <= KPA_PER_MPA * PRESSURE_LIMIT:
+        return None, ()
+    if not values or not all(0 < v <= KPA_PER_MPA * PRESSURE_LIMIT for v in values):
         raise InputError(
             f"{where}: {key} = {table[key]} must lie in 0..{KPA_PER_MPA * PRESSURE_LIMIT:g} kPa (above it the"
             " chambers leak)"
         )
-    return low * MPA_PER_KPA, high * MPA_PER_KPA
+    pressures = tuple(MPA_PER_KPA * v for v in values)
+    if key == "pressure_kPa" and len(pressures) > 1:
+        return None, pressures
+    return (pressures[0], pressures[-1]), ()
 
 
 def _range(value, key, where):
@@ -225,11 +297,13 @@ def _range(value, key, where):
 
 
 PIECE_KEYS = {
+    PASSIVE: ("kind", "length_mm"),
     TWISTING: ("kind", "length_mm", "tau_rad_per_mm"),
-    BENDING: ("kind", "length_mm", "curvature_per_m"),
+    BENDING: ("kind", "length_mm", "roll_deg", "curvature_per_m"),
     HELICAL: (
         "kind",
         "length_mm",
+        "roll_deg",
         "cylinder_curvature_per_m",
         "pitch_mm",
         "curvature_per_m",
@@ -238,9 +312,8 @@ PIECE_KEYS = {
 }
 
 
-def _pieces(rows, where):
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise InputError(f"{where}: pieces are written [[piece]], with double brackets")
+def _pieces(table, where):
+    rows = _tables(table, "piece", where)
     return tuple(_piece(row, f"{where} [[piece]] {i}") for i, row in enumerate(rows, start=1))
 
 
@@ -257,13 +330,14 @@ class _Given(Checked):
     torsion: float | None = quantity("rad_per_m", None, low=-2e3, high=2e3)
     cylinder_curvature: float | None = quantity("per_m", None, above=0, low=1e-6, high=2e3)
     pitch: float | None = quantity("mm", None, low=-1e5, high=1e5)
+    roll: float = quantity("deg", 0.0, low=0, high=270)
 
 
 def _piece(row, where):
     given = from_table(_Given, row, where)
     refuse_unknown(row, PIECE_KEYS[given.kind], where)
     curvature, twist = (given.curvature, given.twist) if given.kind != HELICAL else _helix(given, where)
-    return Piece(given.kind, given.length, twist, curvature)
+    return Piece(given.kind, given.length, twist, curvature, given.roll)
 
 
 def _helix(given, where):

@@ -1,6 +1,6 @@
 """`Target`: what the user wants. Points in space, and what the user says about them beyond that."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -9,12 +9,17 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic
-from pneunet.geometry.designfile import FARTHEST
+from pneunet.base.quantities import Checked, quantity
+from pneunet.design.target.casting import Casting
+from pneunet.design.target.points import checked_frames, checked_points, checked_weights
+from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
+from pneunet.design.target.shapes import TargetShape, TipPoints, checked_pressures
+from pneunet.geometry.loading import DeadLoads
 
-#: kinds of pieces; straight ones are TWISTING, as the segments are that follow them
-BENDING, HELICAL = "bending", "helical"
+#: kinds of pieces beside TWISTING, which is straight and turns about itself; PASSIVE: straight, with no twist
+#: wanted
+BENDING, HELICAL, PASSIVE = "bending", "helical", "passive"
 LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
-PRESSURE_LIMIT = 0.060  # MPa; beyond it silicone pneu-nets leak (Jiang et al. 2021, Sec. IV D)
 
 
 @dataclass(frozen=True)
@@ -22,23 +27,42 @@ class Piece:
     """A part of the target that one segment is to follow; lengths and rates per *deformed* length.
 
     length in mm; twist in rad/mm: the twist tau of a twisting piece, the torsion of a helical one; curvature
-    in 1/mm (Frenet's). None = to be extracted from the points.
+    in 1/mm (Frenet's). None = to be extracted from the points. roll in degrees: by how much the piece is
+    turned about the axis against the section frame that runs through all pieces; 180 bends to the other side.
     """
 
     kind: str
     length: float
     twist: float | None = None
     curvature: float | None = None
+    roll: float = 0.0
+
+
+@dataclass(frozen=True)
+class SplitOptions(Checked):
+    """How a curve is split where no pieces are given, and whether given ones are refined."""
+
+    tolerance: float | None = quantity(
+        "mm", None, "noise to be assumed at least; default 0.0002 of the length", above=0, high=100
+    )
+    most_pieces: int = quantity(None, 8, "pieces at most", low=1, high=20)
+    shortest: float = quantity("mm", 20.0, "length of the shortest piece", low=1, high=1000)
+    refine: bool = quantity(None, False, "whether the places and rates of given pieces are refined")
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
     """points (n, 3) in mm from base to tip, and optionally
 
-    frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); pieces: the
-    split; base_direction, base_width (3,): unit vectors that fix the base (width None = its roll stays free);
-    pressure_range (low, high) in MPa, equal = fixed; material; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice; source: name of the file that it was read from.
+    frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); weights (n,)
+    >= 0: how much each point counts (None: alike; all 0: the curve is a guide, and only `tip` and `shapes`
+    count); pieces: the split; base_direction, base_width (3,): unit vectors that hold the base (width None =
+    its roll stays free, both None = it is free to turn); gravity (3,): acceleration in mm/s2, in the target's
+    coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of several groups of
+    segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip: `TipPoints` as the
+    pressure rises; material; casting: what can be cast; start: {field of Segment: mm}; vary: {field of
+    Segment: (low, high)} or None for the default choice; split: how it is split; source: name of the file
+    that it was read from.
     """
 
     points: np.ndarray
@@ -51,7 +75,14 @@ class Target:
     material: Hyperelastic = PAPER_TWISTING
     start: dict = field(default_factory=dict)
     vary: dict[str, tuple[float, float]] | None = None
+    split: SplitOptions = field(default_factory=SplitOptions)
     source: str = ""
+    weights: np.ndarray | None = None
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pressures: tuple[float, ...] = ()
+    shapes: tuple[TargetShape, ...] = ()
+    tip: TipPoints | None = None
+    casting: Casting = Casting()
 
     @classmethod
     def read(cls, path: str | Path) -> "Target":
@@ -62,11 +93,17 @@ class Target:
         return read_target(path)
 
     def __post_init__(self) -> None:
-        points = np.asarray(self.points, float)
+        points = checked_points(self.points)
         object.__setattr__(self, "points", points)
-        check_points(points)
         if self.frames is not None:
-            object.__setattr__(self, "frames", _checked_frames(np.asarray(self.frames, float), points))
+            object.__setattr__(self, "frames", checked_frames(self.frames, points))
+        if self.weights is not None:
+            object.__setattr__(self, "weights", checked_weights(self.weights, len(points)))
+            if not self.weights.any() and self.tip is None and not self.shapes:
+                raise InputError("weights: all are 0, so that nothing is asked for: give one that is larger")
+        object.__setattr__(self, "gravity", DeadLoads(gravity=tuple(self.gravity)).gravity)
+        if self.pressures:
+            object.__setattr__(self, "pressures", checked_pressures(self.pressures))
         if self.pieces:
             object.__setattr__(self, "pieces", _fitted_to(self.pieces, self.length))
 
@@ -92,50 +129,19 @@ class Target:
             return None
         return np.column_stack([along, across, np.cross(along, across)])
 
+    @property
+    def base_told(self) -> str:
+        """How the base is held, in words."""
+        if self.base_direction is None:
+            return "the base is free to turn: its direction and its roll are results"
+        if self.base_width is None:
+            return "the base is fixed in direction: its roll about it is a result"
+        return "the base is fixed, in direction and roll"
 
-def check_points(points: np.ndarray) -> None:
-    """InputError unless points are (n >= 4, 3), finite, without repeats and of a length that can be built."""
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"points must be rows of x, y, z in mm, not an array of shape {points.shape}")
-    if len(points) < 4:
-        raise InputError(f"{len(points)} points: a target needs at least 4")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(bad):
-        raise InputError(f"point {bad[0] + 1} is not finite: every coordinate must be a number")
-    far = np.flatnonzero((abs(points) > FARTHEST).any(axis=1))
-    if len(far):
-        raise InputError(f"point {far[0] + 1} is over {FARTHEST:g} mm away: are its coordinates in mm?")
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    length = steps.sum()
-    repeated = np.flatnonzero(steps <= 1e-9 * length)
-    if len(repeated):
-        more = f", and {len(repeated) - 1} more such pairs" if len(repeated) > 1 else ""
-        same = f"points {repeated[0] + 1} and {repeated[0] + 2} are the same{more}"
-        raise InputError(f"{same}: remove one of each")
-    if not 10 <= length <= 2000:
-        raise InputError(
-            f"the curve is {length:.4g} mm long, outside 10..2000 mm: are its coordinates in mm?"
-        )
-
-
-def _checked_frames(frames, points):
-    if frames.shape != (len(points), 3, 3):
-        raise InputError(f"frames have shape {frames.shape}: {len(points)} points need ({len(points)}, 3, 3)")
-    if not np.isfinite(frames).all():
-        raise InputError("frames: every component must be a finite number")
-    wrong = abs(np.swapaxes(frames, 1, 2) @ frames - np.eye(3)).max(axis=(1, 2)) > 1e-3
-    wrong |= np.linalg.det(frames) < 0
-    if wrong.any():
-        raise InputError(
-            f"frame {np.argmax(wrong) + 1} is not a right-handed set of orthogonal unit vectors t1, t2, t3"
-        )
-    chords = np.diff(points, axis=0)
-    if (
-        np.sum(chords * (frames[:-1, :, 0] + frames[1:, :, 0]) / 2)
-        < 0.5 * np.linalg.norm(chords, axis=1).sum()
-    ):
-        raise InputError("frames: t1 does not point along the curve, from base to tip")
-    return frames
+    @property
+    def loads(self) -> DeadLoads:
+        """Gravity as dead load, in the target's coordinates."""
+        return DeadLoads(gravity=self.gravity)
 
 
 def _fitted_to(pieces, length):
@@ -147,4 +153,4 @@ def _fitted_to(pieces, length):
             f"[[piece]] length_mm: the pieces add up to {total:.4g} mm but the curve is {length:.4g} mm long"
             " (lengths are deformed ones)"
         )
-    return tuple(Piece(p.kind, p.length * length / total, p.twist, p.curvature) for p in pieces)
+    return tuple(replace(p, length=p.length * length / total) for p in pieces)

@@ -12,13 +12,13 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
-from pneunet.geometry.meshfile import TetrahedralMesh
+from pneunet.geometry.meshfile import VolumeMesh
 from pneunet.geometry.parameters import Segment
 
 #: some 13 million unknowns: beyond any direct solver
 MOST_CELLS = 3e6
 #: gmsh's types of linear elements
-TRIANGLE, TETRAHEDRON = 2, 4
+TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON = 2, 3, 4, 5
 
 
 def refuse_absurd(mesh_size: float, parts: Iterable[tuple[Segment, float, int]]) -> None:
@@ -38,7 +38,7 @@ def refuse_absurd(mesh_size: float, parts: Iterable[tuple[Segment, float, int]])
         )
 
 
-def tetrahedral_mesh() -> TetrahedralMesh:
+def tetrahedral_mesh() -> VolumeMesh:
     """What the current gmsh model has meshed of its tagged volumes and faces, group after group."""
     numbers, points, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(numbers)
@@ -50,12 +50,10 @@ def tetrahedral_mesh() -> TetrahedralMesh:
         given = np.repeat(np.array([tag for _, tag in owners]), [len(each) for each in rows])
         return np.searchsorted(numbers[order], np.concatenate(rows)), given
 
-    return TetrahedralMesh(
-        points.reshape(-1, 3)[order], *elements(3, TETRAHEDRON, 4), *elements(2, TRIANGLE, 3)
-    )
+    return VolumeMesh(points.reshape(-1, 3)[order], *elements(3, TETRAHEDRON, 4), *elements(2, TRIANGLE, 3))
 
 
-def save(path: Path, mesh: TetrahedralMesh, facts: dict[str, Any]) -> None:
+def save(path: Path, mesh: VolumeMesh, facts: dict[str, Any]) -> None:
     """Write the .npz `path` and, beside it, gmsh's file of the current model."""
     gmsh.option.setNumber("Mesh.Binary", 1)
     write_model(path.with_suffix(".msh"))

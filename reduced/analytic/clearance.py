@@ -11,6 +11,7 @@ also open as the segment bends. It is a design rule; only the FE says whether wa
 import numpy as np
 
 from pneunet.geometry.parameters import Segment
+from pneunet.geometry.shape_numbers import SHAPE
 
 #: Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, Table 35 (nu = 0.3), times 12 (1 - nu^2)
 SIDE_RATIOS = np.array([1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 1e9])
@@ -20,17 +21,42 @@ MEMBRANE = 30.0
 
 def wall_bulge(segment: Segment, pressure: float) -> float:
     """Central deflection (mm) of one chamber wall at `pressure` (MPa)."""
+    return _bulge(segment, pressure)[0]
+
+
+def _bulge(segment, pressure):
+    """(deflection, its derivatives by the cavity's height, its slanted length, the wall and the pressure)."""
     height, length = segment.chamber_height, segment.cavity_width / segment.sin
     short, long = min(height, length), max(height, length)
-    t = segment.wall
-    load = pressure * short**4 / (3 * segment.material.mu * t**4)
-    stiffness = 1 / np.interp(np.log(long / short), np.log(SIDE_RATIOS), ALPHA)
+    t, mu = segment.wall, segment.material.mu
+    load = pressure * short**4 / (3 * mu * t**4)
+    ratio = np.log(long / short)
+    alpha = np.interp(ratio, np.log(SIDE_RATIOS), ALPHA)
+    stiffness = 1 / alpha
     # the one real root of MEMBRANE x^3 + stiffness x = load (Cardano, with hyperbolic functions)
     q = 1.5 * load / stiffness * np.sqrt(3 * MEMBRANE / stiffness)
     x = 2 * np.sqrt(stiffness / (3 * MEMBRANE)) * np.sinh(np.arcsinh(q) / 3)
-    return float(x * t)
+    i = min(int(np.searchsorted(np.log(SIDE_RATIOS), ratio, side="right")), len(ALPHA) - 1)
+    rise = (ALPHA[i] - ALPHA[i - 1]) / np.log(SIDE_RATIOS[i] / SIDE_RATIOS[i - 1])
+    # load = load(short, t, P) and stiffness = stiffness(long/short)
+    steep = 3 * MEMBRANE * x**2 + stiffness
+    by_ratio = x * rise / alpha**2 / steep * t
+    by_long, by_short = by_ratio / long, (4 * load / steep * t - by_ratio) / short
+    by_height, by_length = (by_short, by_long) if height <= length else (by_long, by_short)
+    return float(x * t), by_height, by_length, x - 4 * load / steep, load / steep * t / max(pressure, 1e-12)
 
 
 def gap_left(segment: Segment, pressure: float) -> float:
     """Estimated distance (mm) left between facing walls; negative where they are expected to touch."""
     return segment.gap - 2 * wall_bulge(segment, pressure)
+
+
+def gap_left_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
+    """(the same, its derivatives (14,) by the lengths of geometry.shape_numbers.SHAPE, in degrees and mm, and
+    by the pressure in MPa)."""
+    bulge, by_height, by_length, by_wall, by_pressure = _bulge(segment, pressure)
+    by_angle = -by_length * segment.cavity_width * segment.cot / segment.sin * np.radians(1.0)
+    by = {"chamber_height": by_height, "wall": by_wall, "angle": by_angle, "gap": -0.5}
+    by |= {"width": by_length / segment.sin, "side_wall": -2 * by_length / segment.sin}
+    slopes = np.array([by.get(name, 0.0) for name in SHAPE] + [by_pressure])
+    return segment.gap - 2 * bulge, -2 * slopes

@@ -1,15 +1,35 @@
-"""Where a segment's cells end: its free pieces, bare core, cells, bare core.
+"""From the strains of cells to the free pieces of a body: bare core, cells, bare core of each segment, in the
+body's axes.
 
 Every chamber counts with its whole pitch, half a gap at the ends included, and the ends of slanted one-sided
-segments turn about z (docs/theory-reduced.md).
+segments turn about z (docs/theory-reduced.md). A law answers in a segment's own axes; this is where its roll
+turns strains. A passive segment is three thirds of bare core.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base.strains import RodStrains
-from pneunet.geometry.parameters import ONE_SIDED, Segment
+from pneunet.geometry.parameters import ONE_SIDED, PASSIVE, Segment
+from pneunet.geometry.sections import rotation
+from pneunet.reduced.rod.laws import SegmentLaw
+
+
+def cell_strains(
+    law: SegmentLaw | Sequence[SegmentLaw], segments: Sequence[Segment], pressures: ArrayLike
+) -> RodStrains:
+    """Free RodStrains (n, 3) of n segments in their own axes, at a pressure (MPa) for all or (n,); law: one
+    for all or one for each. Passive segments are at rest at any."""
+    n = len(segments)
+    laws = list(law) if isinstance(law, Sequence) else [law] * n
+    pressures, q = np.broadcast_to(np.asarray(pressures, float), n), np.tile(np.eye(6)[0], (n, 1))
+    for each in dict.fromkeys(laws):  # all at once
+        rows = [i for i in range(n) if laws[i] is each and segments[i].kind != PASSIVE]
+        if rows:
+            q[rows] = each.each([segments[i] for i in rows], pressures[rows]).vector
+    return RodStrains.of_vector(q)
 
 
 def free_pieces(
@@ -18,8 +38,8 @@ def free_pieces(
     counts: Sequence[float] | np.ndarray | None = None,
     end_effects: bool = True,
 ) -> tuple[np.ndarray, RodStrains]:
-    """(lengths (3 n,) in mm, RodStrains (3 n, 3)) of n segments in a row: the three pieces of each, at its
-    cells' free RodStrains (n, 3).
+    """(lengths (3 n,) in mm, RodStrains (3 n, 3) in the body's axes) of n segments in a row: the three pieces
+    of each, at its cells' free RodStrains (n, 3) in its own axes.
 
     counts (n,): of chambers, real numbers, by default the segments' own. end_effects: False for cells from
     outermost wall to outermost wall, between straight ends.
@@ -33,7 +53,12 @@ def free_pieces(
     if end_effects:
         k[:, 0, 2] = [_end_turn(*both) for both in zip(segments, free.vector.tolist())] / lengths[:, 0]
         k[:, 2, 2] = -k[:, 0, 2]
-    return lengths.ravel(), RodStrains(e.reshape(-1, 3), k.reshape(-1, 3))
+    lengths[[s.kind == PASSIVE for s in segments]] = np.array(
+        [s.plain_length / 3 for s in segments if s.kind == PASSIVE]
+    ).reshape(-1, 1)
+    turn = np.array([rotation(s) for s in segments])[:, None]
+    e, k = ((turn @ part[..., None]).reshape(-1, 3) for part in (e, k))
+    return lengths.ravel(), RodStrains(e, k)
 
 
 def _end_turn(segment: Segment, free: list[float]) -> float:

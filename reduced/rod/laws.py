@@ -6,7 +6,8 @@ state, its gradient is (force, moment) in the section frame.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -16,6 +17,11 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.parameters import Segment
+from pneunet.geometry.shape_numbers import SHAPE
+from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
+
+#: degrees and mm, and of the pressure: of laws without slopes of their own
+DIFFERENCE = 1e-4
 
 
 @runtime_checkable
@@ -56,8 +62,38 @@ class FreeSection(ABC):
     force = stiffness = psi
 
 
+@dataclass(frozen=True)
+class TurnedSection:
+    """`law` in axes that `rotation` (3, 3) takes its own to: what a roll makes of a section."""
+
+    law: SectionLaw
+    rotation: np.ndarray
+
+    def _turned(self, q: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        q = np.asarray(q, float)
+        return (q.reshape(*q.shape[:-1], 2, 3) @ rotation.T).reshape(q.shape)
+
+    def free_strains(self, P: float | np.ndarray) -> np.ndarray:
+        """(..., 6) minimiser of psi."""
+        return self._turned(self.law.free_strains(P), self.rotation)
+
+    def psi(self, q: np.ndarray, P: float | np.ndarray) -> np.ndarray:
+        """(...,) enthalpy per undeformed length, N."""
+        return self.law.psi(self._turned(q, self.rotation.T), P)
+
+    def force(self, q: np.ndarray, P: float | np.ndarray) -> np.ndarray:
+        """(..., 6) force (N) and moment (N mm)."""
+        return self._turned(self.law.force(self._turned(q, self.rotation.T), P), self.rotation)
+
+    def stiffness(self, q: np.ndarray, P: float | np.ndarray) -> np.ndarray:
+        """(..., 6, 6) in N, N mm and N mm2."""
+        both = np.kron(np.eye(2), self.rotation)
+        return both @ self.law.stiffness(self._turned(q, self.rotation.T), P) @ both.T
+
+
 class SegmentLaw(ABC):
-    """What predicts the free strains of the middle of a long segment; `name`: what --law calls it."""
+    """What predicts the free strains of the middle of a long segment with chambers, in the segment's own axes
+    whatever its roll (reduced.rod.ends turns them); `name`: what --law calls it."""
 
     name: str
 
@@ -91,9 +127,43 @@ class SegmentLaw(ABC):
                     break
         return RodStrains.of_vector(q)
 
+    def each_with_slopes(
+        self, segments: Sequence[Segment], pressure: float | ArrayLike, names: Collection[str] = SHAPE
+    ) -> StatesWithSlopes:
+        """StatesWithSlopes of n segments at a pressure in MPa, one for all or (n,), of the strains alone; by
+        central differences, and only by those of SHAPE that are among `names`, the others 0."""
+        pressures = np.broadcast_to(np.asarray(pressure, float), len(segments))
+        slopes = np.zeros((len(segments), 6, len(VARIABLES)))
+        for by, segment, P in zip(slopes, segments, pressures):
+            for j, name in enumerate(SHAPE):
+                if name in names:
+                    by[:, j] = self._slope(segment, P, name)
+            step = DIFFERENCE * max(P, DIFFERENCE)
+            low, high = (self.strains(segment, P + d).vector for d in (-step, step))
+            by[:, -2] = (high - low) / (2 * step)
+            by[:, -1] = -P / segment.material.mu * by[:, -2]
+        return StatesWithSlopes.of_strains(self.each(segments, pressures).vector, slopes)
+
+    def _slope(self, segment, pressure, name):
+        """(6,) derivative by one of SHAPE; 0 where the segment cannot be changed in it, one-sided where only
+        that can be."""
+        value, found = getattr(segment, name), []
+        for step in (-DIFFERENCE, DIFFERENCE):
+            try:
+                found.append((step, self.strains(replace(segment, **{name: value + step}), pressure).vector))
+            except (InputError, ConvergenceError):
+                found.append((0.0, self.strains(segment, pressure).vector))
+        (low, before), (high, after) = found
+        return (after - before) / (high - low) if high > low else np.zeros(6)
+
     def excess(self, segment: Segment, pressure: float) -> np.ndarray:
         """How far (0: not at all) the segment lies outside what the law knows, (d,) in widths of that."""
         return np.zeros(1)
+
+    def half_width(self, segment: Segment, pressure: float) -> np.ndarray | None:
+        """(6,) half of the 90 % interval of each free strain at a pressure in MPa, or None where the law does
+        not know how wrong it is."""
+        return None
 
     def doubts(self, segment: Segment, pressure: float | ArrayLike) -> tuple[str, ...]:
         """Reasons, as text, not to trust the law for a segment at a pressure or several; () when there are

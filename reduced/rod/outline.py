@@ -6,9 +6,11 @@ so that the solid keeps its volume. Chambers move with the sections; their swell
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pneunet.base.errors import InputError
 from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.sections import rotation
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.prediction import predict
 
@@ -34,16 +36,15 @@ def _box(divisions):
 
 
 def segment_outline(segment: Segment, spacing: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Undeformed outline of one segment from x = 0: vertices (n, 3) in mm and quads (m, 4), turned
-    outwards."""
+    """Undeformed outline of one segment from x = 0, in the body's axes: vertices (n, 3) in mm and quads (m,
+    4), turned outwards."""
     s = segment
 
     def divisions(length):
         return max(int(np.ceil(length / spacing - 1e-9)), 1)
 
-    across = divisions(s.width)
-    cube, quads = _box((divisions(s.length), 1, 1))
-    height = s.core_top - s.core_bottom
+    across, height = divisions(s.width), s.core_top - s.core_bottom
+    cube, quads = _box((divisions(s.length), across, divisions(height)))
     vertices = [cube * [s.length, s.width, height] + [0, -s.width / 2, s.core_bottom]]
     all_quads, count = [quads], len(cube)
     thickness, height = s.chamber_thickness / s.sin, s.chamber_top - s.core_top
@@ -56,17 +57,17 @@ def segment_outline(segment: Segment, spacing: float = 1.0) -> tuple[np.ndarray,
             vertices.append(np.stack([centre + x, side * y, side * z], axis=1))
             all_quads.append(quads + count)
             count += len(cube)
-    return np.concatenate(vertices), np.concatenate(all_quads)
+    return np.concatenate(vertices) @ rotation(s).T, np.concatenate(all_quads)
 
 
 def body_surface(
     manipulator: Manipulator,
-    pressure: float,
+    pressure: float | ArrayLike,
     law: SegmentLaw,
     spacing: float = 1.0,
     base_pose: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The deformed outline of a manipulator at `pressure` (MPa).
+    """The deformed outline of a manipulator at `pressure` (MPa; one for all, or one for each group).
 
     Returns vertices (n, 3) in mm, quads (m, 4) of vertex numbers, and the segment's index of each quad (m,).
     spacing: edge length along the body, mm; base_pose (4, 4) as in `predict`.

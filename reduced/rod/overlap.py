@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.sections import whole_section
 from pneunet.reduced.rod.centreline import Centreline
 
 
@@ -15,9 +16,9 @@ def overlap_doubts(manipulator: Manipulator, line: Centreline) -> tuple[str, ...
     centres are nearer than both reach towards each other, each as a rectangle in its own frame.
     """
     segments = manipulator.segments
-    extents = np.array([(s.width / 2, s.chamber_top, s.chamber_bottom) for s in segments])
+    extents = np.array([whole_section(s) for s in segments])
     owner = np.clip(np.searchsorted(manipulator.starts, line.s, side="right") - 1, 0, len(segments) - 1)
-    diagonal = 2 * max(np.hypot(half, max(top, -bottom)) for half, top, bottom in extents)
+    diagonal = 2 * np.linalg.norm(abs(extents).max(axis=2), axis=1).max()
     pairs = cKDTree(line.points).query_pairs(diagonal, output_type="ndarray")
     pairs = pairs[abs(np.diff(line.s[pairs], axis=1)[:, 0]) > diagonal]
     between = line.points[pairs[:, 1]] - line.points[pairs[:, 0]]
@@ -25,9 +26,9 @@ def overlap_doubts(manipulator: Manipulator, line: Centreline) -> tuple[str, ...
     room = distance**2
     for end, sign in ((0, 1), (1, -1)):
         at = pairs[:, end]
-        half, top, bottom = extents[owner[at]].T
-        _, y, z = sign * np.einsum("nij,ni->jn", line.poses[at, :3, :3], between)
-        room -= half * abs(y) + np.where(z > 0, top, bottom) * z
+        towards = sign * np.einsum("nij,ni->nj", line.poses[at, :3, 1:3], between)
+        low, high = np.moveaxis(extents[owner[at]], 2, 0)
+        room -= (np.where(towards > 0, high, low) * towards).sum(axis=1)
     if not (room < 0).any():
         return ()
     nearest = np.flatnonzero(room < 0)[np.argmin(distance[room < 0])]

@@ -16,13 +16,14 @@ from pneunet.base.errors import InputError
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.loading import DeadLoads
-from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
+from pneunet.geometry.sections import core_section, rotation
 from pneunet.reduced.rod.areas import active_mass, passive_mass
 from pneunet.reduced.rod.centreline import Centreline, centreline
-from pneunet.reduced.rod.ends import free_pieces
+from pneunet.reduced.rod.ends import cell_strains, free_pieces
 from pneunet.reduced.rod.equilibrium import refine
-from pneunet.reduced.rod.laws import SectionLaw, SegmentLaw
-from pneunet.reduced.rod.quadratic import QuadraticLaw, passive_law
+from pneunet.reduced.rod.laws import SectionLaw, SegmentLaw, TurnedSection
+from pneunet.reduced.rod.quadratic import passive_law
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,8 @@ class Rod:
         base_pose: np.ndarray | None = None,
         end_effects: bool = True,
     ) -> "Rod":
-        """The rod of a Manipulator. laws, pressure (MPa): one for all segments or one for each.
+        """The rod of a Manipulator. laws: one for all segments or one for each; pressure (MPa): one for all
+        or one for each group of them.
 
         end_effects (docs/theory-reduced.md): every chamber counts with its whole pitch, half a gap at the
         ends included, and the ends of slanted one-sided segments turn about z; False: active from outermost
@@ -93,26 +95,27 @@ class Rod:
         for law in laws:
             if not isinstance(law, SegmentLaw):
                 raise InputError(f"laws: {type(law).__name__} is no SegmentLaw, such as choose_law() gives")
-        if len(laws) != n or np.shape(pressure) not in ((), (n,)):
-            raise InputError(f"laws, pressure_kPa: give one for all or one for each of the {n} segments")
-        pressures, free = np.broadcast_to(np.asarray(pressure, float), n), np.empty((n, 6))
-        for law in set(laws):  # all at once, as `predict` does
-            rows = [i for i in range(n) if laws[i] is law]
-            free[rows] = law.each([segments[i] for i in rows], pressures[rows]).vector
-        lengths, strains = free_pieces(segments, RodStrains.of_vector(free), end_effects=end_effects)
+        if len(laws) != n:
+            raise InputError(f"laws: give one for all or one for each of the {n} segments")
+        pressures = manipulator.pressures(pressure)
+        cells = cell_strains(laws, segments, pressures)
+        lengths, strains = free_pieces(segments, cells, end_effects=end_effects)
         pieces: list[RodPiece] = []
-        known: dict[tuple[Segment, float], QuadraticLaw] = {}
+        known: dict[tuple[Segment, int, float], SectionLaw] = {}
         for i, (length, q) in enumerate(zip(lengths.tolist(), strains.vector)):  # three of each segment
-            segment, law, P = segments[i // 3], laws[i // 3], float(pressures[i // 3])
-            if i % 3 == 1:
+            segment, P = segments[i // 3], float(pressures[i // 3])
+            turn = rotation(segment)
+            if i % 3 == 1 and segment.kind != PASSIVE:
                 mass, z = active_mass(segment)
-                pieces.append(RodPiece(length, law.of(segment), P, mass, (0.0, z), q))
+                section: SectionLaw = _turned(laws[i // 3].of(segment), segment)
             else:
-                (mass, z), bend = passive_mass(segment), float(q[5])
-                bare = known.setdefault((segment.key, bend), passive_law(segment, bend))
-                pieces.append(RodPiece(length, bare, 0.0, mass, (0.0, z), q))
-        tip_centre = (0.0, (segments[-1].core_bottom + segments[-1].core_top) / 2)
-        return cls(pieces, np.eye(4) if base_pose is None else base_pose, tip_centre)
+                (mass, z), P, bend = passive_mass(segment), 0.0, float(turn[:, 2] @ q[3:])
+                alike = segment.key, segment.roll, bend
+                section = known.setdefault(alike, _turned(passive_law(segment, bend), segment))
+            y, z = (turn[1:, 2] * z).tolist()
+            pieces.append(RodPiece(length, section, P, mass, (y, z), q))
+        y, z = core_section(segments[-1]).mean(axis=1).tolist()
+        return cls(pieces, np.eye(4) if base_pose is None else base_pose, (y, z))
 
     @property
     def lengths(self) -> np.ndarray:
@@ -182,3 +185,8 @@ class RodState:
     def tip(self) -> np.ndarray:
         """(4, 4) frame of the tip."""
         return self.line.poses[-1]
+
+
+def _turned(law: SectionLaw, segment: Segment) -> SectionLaw:
+    """The law of a segment's section in the body's axes."""
+    return TurnedSection(law, rotation(segment)) if segment.roll else law

@@ -57,6 +57,8 @@ TINY, TOUCH_WIDTH = 1e-6, 0.01
 SMALL_OVERLAP = 0.01
 #: the gap's place among the shape numbers
 GAP = SHAPE.index("gap")
+#: places of the leading strain and the overlap among the path_inputs
+LEAD, OVERLAP = -3, -1
 #: kind -> (index of the leading strain, of the others that are not zero)
 LEADING = {ONE_SIDED: (4, (0, 1, 3)), TWISTING: (0, (3,))}
 #: kind -> blocks of the stiffness
@@ -84,6 +86,15 @@ class Coordinates:
         that those know only in sums."""
         apart = np.log(np.maximum(shape[:, [SHAPE.index(name) for name in IN_SUMS[self.kind]]], SMALLEST))
         return np.hstack([self.inputs(shape, pressure, level), apart])
+
+    def ranged_slopes(self, shape: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """(n, r, 14) derivatives of `ranged` by the 13 shape numbers and P/mu."""
+        d, apart = len(LENGTHS[self.kind]) + 3, [SHAPE.index(name) for name in IN_SUMS[self.kind]]
+        by = np.zeros((len(shape), d + len(apart), len(SHAPE) + 1))
+        by[:, :d] = self.by_shape(shape, np.broadcast_to(np.eye(d), (len(shape), d, d)))
+        by[:, d - 2, -1] = 1 / (pressure + SMALL_PRESSURE)
+        by[:, d + np.arange(len(apart)), apart] = 1 / np.maximum(shape[:, apart], SMALLEST)
+        return by
 
     def path_inputs(
         self, shape: np.ndarray, lead: np.ndarray, level: float | np.ndarray, overlap: np.ndarray

@@ -18,7 +18,7 @@ from pneunet.reduced.trained.gaussian import GaussianProcess
 from pneunet.reduced.trained.law import KindLaw, TrainedLaw
 from pneunet.reduced.trained.side_by_side import SideBySide
 
-SCHEMA = "pneunet-law-7"
+SCHEMA = "pneunet-law-8"
 KEYS = {"kinds": list, "shape": list, "lengths": dict}
 #: fields of the Gaussian processes side by side that are the same in all of them
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
@@ -45,6 +45,8 @@ def write_law(path: Path, law: TrainedLaw) -> None:
                     value = np.asarray(getattr(process, f.name), SHORT.get(f.name))
                     arrays[_key(kind, name, number, f.name)] = value
         arrays[f"{kind}/furthest"] = np.asarray(k.path.furthest)
+        arrays[f"{kind}/remainder"] = k.path.remainder
+        arrays[f"{kind}/landmarks"] = k.path.landmarks.astype("u2")
         for name in ("quantile", "low", "high", "doubt", "level"):
             arrays[f"{kind}/{name}"] = np.asarray(getattr(k, name))
         for name in ANHARMONIC:
@@ -110,6 +112,8 @@ def _members(about: dict, names: Collection[str]) -> dict[str, Member]:
         ranged = Member("f", (d + len(IN_SUMS[kind]),))
         own = {
             "furthest": Member("f", (), POSITIVE),
+            "remainder": Member("f", (2, 2), 0.0),
+            "landmarks": Member("iu", (f"{kind} landmarks",), 0, f"{kind} path m"),
             "quantile": Member("f", (6,), 0.0),
             "low": ranged,
             "high": ranged,
@@ -136,7 +140,8 @@ def _read_kind(stored, kind):
     }
     closing, learned, start, smooth, contact = PROCESSES  # of how walls close and touch there may be none
     known = Closing(kind, beside.get(closing)), beside[learned], beside[start]
-    path = FreePath(kind, *known, float(stored[f"{kind}/furthest"]))
+    cheap = (stored[f"{kind}/{name}"] for name in ("remainder", "landmarks"))
+    path = FreePath(kind, *known, float(stored[f"{kind}/furthest"]), *cheap)
     plain = {name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")}
     anharmonic = Anharmonic(kind, *(stored[f"{kind}/anharmonic/{name}"] for name in ANHARMONIC))
     doubt, level = float(stored[f"{kind}/doubt"]), int(stored[f"{kind}/level"])

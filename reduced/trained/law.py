@@ -6,7 +6,7 @@ train` (reduced.training.train), stored by reduced.trained.file.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -18,8 +18,9 @@ from pneunet.base.materials.laws import NeoHookean
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.parameters import TWISTING, Segment
-from pneunet.geometry.shape_numbers import normal_pitch, shape_numbers, shapes_of
+from pneunet.geometry.shape_numbers import SHAPE, normal_pitch, shape_numbers, shapes_of
 from pneunet.reduced.rod.laws import SegmentLaw, checked_pressure
+from pneunet.reduced.rod.states import Slopes, StatesWithSlopes
 from pneunet.reduced.trained.coordinates import Coordinates, cosine
 from pneunet.reduced.trained.enthalpy import (
     Anharmonic,
@@ -29,7 +30,7 @@ from pneunet.reduced.trained.enthalpy import (
     anharmonic_value,
     whitening,
 )
-from pneunet.reduced.trained.free_path import FreePath
+from pneunet.reduced.trained.free_path import NEARER, FreePath
 from pneunet.reduced.trained.free_stiffness import FreeStiffness
 
 #: a length that the sample ties to another may differ from it by so much of itself before the law says so
@@ -38,6 +39,9 @@ TIE_TOLERANCE = 0.02
 SILICONES = "strains of fitted silicones differed by up to 1.2 % at P/mu = 0.1 and 7.3 % at 0.2"
 #: of an input's range, by which dimensions may leave it that `pneunet design` has put on its edge and rounded
 ROUNDED = 1e-3
+#: far from all that was learned the deviation that inducing points give may be too small, so it counts times
+#: this when it comes to doubts
+FAR = 1.04
 #: lowest P/mu, whose logarithm is taken
 LOWEST = 1e-9
 log = logging.getLogger(__name__)
@@ -100,20 +104,46 @@ class KindLaw:
         (n, 6)."""
         return self.anharmonic.at(self.coordinates.around_inputs(shape, strains, closed), cosine(shape))
 
-    def half_width(self, shape: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-        """(n, 6) half of the 90 % interval of each free strain."""
-        return self.quantile * self.path.spread(shape, np.maximum(pressure, LOWEST), self.level)
+    def half_width(self, shape: np.ndarray, pressure: np.ndarray, exact: bool = False) -> np.ndarray:
+        """(n, 6) half of the 90 % interval of each free strain; exact: as for FreePath.spread."""
+        return self.quantile * self.path.spread(shape, np.maximum(pressure, LOWEST), self.level, exact)
 
     def excess(self, shape: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(n, r + 2) how far a design lies outside what the law was taught: of each of Coordinates.ranged in
         widths of its range, of the free states' deviation in units of the largest that counts as known, and
         of log P beyond the end of their path; 0 inside."""
         pressure = np.maximum(pressure, LOWEST)
-        x = self.ranged(shape, pressure)
-        width = np.maximum(self.high - self.low, 1.0)  # a level's may be 0
-        box = np.maximum(np.maximum(self.low - x, x - self.high) - 1e-9, 0) / width
         _, beyond, there = self.path.at(shape, pressure, self.level)
-        return np.column_stack([box, np.maximum(self.path.deviation(there) / self.doubt - 1, 0), beyond])
+        return self._excess(self.ranged(shape, pressure), self.path.deviation(there, self.known), beyond)
+
+    @property
+    def known(self) -> float:
+        """Largest deviation, from inducing points, that counts as known."""
+        return self.doubt / FAR
+
+    def _excess(self, ranged, deviation, beyond):
+        outside = np.maximum(np.maximum(self.low - ranged, ranged - self.high) - 1e-9, 0) / self._width
+        unknown = np.maximum(deviation / self.known - 1, 0)
+        return np.concatenate([outside, unknown[:, None], beyond[:, None]], axis=1)
+
+    @cached_property
+    def _width(self):
+        return np.maximum(self.high - self.low, 1.0)  # a level's may be 0
+
+    def with_slopes(self, shape: np.ndarray, pressure: np.ndarray) -> tuple[Slopes, Slopes, Slopes]:
+        """(`free_strains` (n, 6), `excess` (n, r + 2), `closed` (n,)), each with its derivatives (..., 14) by
+        the 13 shape numbers (the angle in degrees) and P/mu: everything from one search."""
+        pressure = np.maximum(pressure, LOWEST)
+        state = self.path.state_and_slopes(shape, pressure, self.level, NEARER)
+        x = self.ranged(shape, pressure)
+        deviation, by_inputs = self.path.deviation_and_slopes(state.inputs, self.known)
+        excess = self._excess(x, deviation, state.beyond)
+        by = np.zeros((*excess.shape, shape.shape[1] + 1))
+        if excess.any():  # mostly there is none
+            side = np.sign(2 * x - self.low - self.high) * (excess[:, :-2] > 0) / self._width
+            by[:, :-2] = side[:, :, None] * self.coordinates.ranged_slopes(shape, pressure)
+            by[:, -2], by[:, -1] = state.of_inputs(by_inputs) / self.known, state.beyond_by
+        return state.strains_and_slopes(), (excess, by), state.closed_and_slopes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,16 +189,37 @@ class TrainedLaw(SegmentLaw):
         found = self._at(segments, np.broadcast_to(checked_pressure(pressure), len(segments))[:, None])
         return RodStrains(found.e[:, 0], found.k[:, 0])
 
+    def each_with_slopes(
+        self, segments: Sequence[Segment], pressure: float | ArrayLike, names: Collection[str] = SHAPE
+    ) -> StatesWithSlopes:
+        """StatesWithSlopes of n segments at a pressure in MPa, one for all or (n,), all at once: free
+        strains, how far each lies outside what the law knows, and how far its walls have closed, with exact
+        derivatives by dimensions, pressure and modulus.
+
+        Strains are those of `each` but for the last 1e-5 of them, which are computed as well here: values
+        and derivatives belong together. Next to a limit load, where strains over the pressure turn vertical,
+        derivatives are bounded; beyond it the leading strain counts as constant."""
+        pressures, (shape, pitch) = checked_pressure(pressure), shapes_of(segments)
+        mu = np.array([s.material.mu for s in segments])
+        P = np.broadcast_to(pressures, len(segments))
+        found = [
+            (rows, law.with_slopes(shape[rows], P[rows] / mu[rows])) for rows, law in self._by_kind(segments)
+        ]
+        return StatesWithSlopes.of(found, shape, pitch, P, mu)
+
+    def _by_kind(self, segments):
+        """[(places of the segments of a kind, its KindLaw)]."""
+        alike: dict[str, list[int]] = {}
+        for i, segment in enumerate(segments):
+            alike.setdefault(segment.kind, []).append(i)
+        return [(rows, self._kind(segments[rows[0]])) for rows in alike.values()]
+
     def _at(self, segments: Sequence[Segment], pressures: np.ndarray) -> RodStrains:
         """RodStrains (n, m, 3) at pressures (n, m)."""
         (shape, pitch), m = shapes_of(segments), pressures.shape[1]
         P = pressures / np.array([s.material.mu for s in segments])[:, None]
         q = np.empty((*P.shape, 6))
-        alike: dict[str, list[int]] = {}
-        for i, segment in enumerate(segments):
-            alike.setdefault(segment.kind, []).append(i)
-        for rows in alike.values():
-            law = self._kind(segments[rows[0]])
+        for rows, law in self._by_kind(segments):
             q[rows] = law.free_strains(shape[rows].repeat(m, axis=0), P[rows].ravel()).reshape(-1, m, 6)
         return RodStrains(q[..., :3], q[..., 3:] / pitch[:, None, None])
 
@@ -178,6 +229,10 @@ class TrainedLaw(SegmentLaw):
         return self._kind(segment).excess(
             shape_numbers(segment)[None], np.array([pressure / segment.material.mu])
         )[0]
+
+    def half_width(self, segment: Segment, pressure: float) -> np.ndarray:
+        """As SegmentLaw.half_width."""
+        return self.of(segment).half_width(pressure)
 
     def doubts(self, segment: Segment, pressure: float | ArrayLike) -> tuple[str, ...]:
         """Reasons, as text, not to trust the law for a segment at a pressure (MPa) or several; () when there
@@ -232,6 +287,8 @@ class TrainedSection:
         shape, p = self._rows(P)
         law, co = self.law, self.law.coordinates
         excess = law.excess(shape, p)
+        if not excess.any():
+            return self.remarks
         told = co.told(law.ranged(shape, p)[excess.max(axis=1).argmax()])
         known = np.sort([co.told(law.low), co.told(law.high)], axis=0).T
         reasons = [

@@ -16,6 +16,7 @@ from pneunet.reduced.trained.law import LOWEST, KindLaw
 from pneunet.reduced.trained.side_by_side import SideBySide
 from pneunet.reduced.training.anharmonic import fit_anharmonic
 from pneunet.reduced.training.judging import symmetric
+from pneunet.reduced.training.landmarks import LANDMARKS, with_cheap_doubt
 from pneunet.reduced.training.regression import LOG_NOISES, FitSettings, Slopes, fit_side_by_side
 from pneunet.reduced.training.states import Sample, States, folds
 
@@ -89,7 +90,8 @@ def fit_path(
     states: States, like: FreePath | None = None, again: bool = False, slopes: bool = True
 ) -> FreePath:
     """The FreePath of the free states; the leading strain has a metric of its own (measured: a quarter off
-    its error)."""
+    its error). Without remainder and with the first inducing points as landmarks: `with_cheap_doubt` finds
+    better ones."""
     states = states.loaded
     co = Coordinates(states.kind)
     closing = fit_closing(states, like.closing.process if like else None, again)
@@ -115,7 +117,9 @@ def fit_path(
     start = fit_side_by_side(
         states.inputs[good], -y[good, :1], states.case[good], trust, (1,), settings=rough
     )
-    return FreePath(states.kind, closing, learned, start, FURTHEST * float(co.leading(states.strains).max()))
+    furthest = FURTHEST * float(co.leading(states.strains).max())
+    none, first = np.zeros((2, 2)), np.arange(min(LANDMARKS, len(learned.processes[0].inducing)))
+    return FreePath(states.kind, closing, learned, start, furthest, none, first)
 
 
 def fit_strains(
@@ -209,7 +213,8 @@ def fit_kind(sample: Sample, like: KindLaw | None = None, again: bool = True) ->
     x = co.ranged(states.shape, states.pressure, states.level)
     level = int(states.level.max())
     _, _, there = path.at(states.shape, np.maximum(states.pressure, LOWEST), level)
-    doubt = DOUBT * float(path.deviation(there).max())
+    doubt = DOUBT * float(path.learned.processes[0].deviation(there).max())
+    path = with_cheap_doubt(path, there)
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
     low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
     low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
@@ -225,7 +230,7 @@ def _quantiles(law, states, drawn):
     for judged in folds(np.unique(states.design[states.design < drawn]), FOLDS):
         out = np.isin(states.design, judged)
         path, t = fit_path(states.of(~out), like=law.path), states.of(out)
-        spread = path.spread(t.shape, t.pressure, t.level)
+        spread = path.spread(t.shape, t.pressure, t.level, exact=True)
         miss = np.abs(path.strains(t.shape, t.pressure, t.level) - t.strains)
         scores.append(np.divide(miss, spread, out=np.zeros_like(miss), where=spread > 0))
     return np.quantile(np.concatenate(scores), INTERVAL, axis=0)

@@ -67,7 +67,7 @@ def symmetric(K: np.ndarray) -> np.ndarray:
 
 def within(law: KindLaw, states: States) -> np.ndarray:
     """(n, p) bool: whether strains that are not zero by symmetry lie within their 90 % intervals."""
-    half = law.half_width(states.shape, states.pressure)
+    half = law.half_width(states.shape, states.pressure, exact=True)
     inside = np.abs(law.free_strains(states.shape, states.pressure) - states.strains) <= half
     return inside[:, law.quantile > 0]
 

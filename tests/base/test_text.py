@@ -54,6 +54,14 @@ def test_quoted_decimal_commas_and_files_of_people(tmp_path):
     assert values(read_numbers_table(PEOPLE / "semicolon.csv"))[1].tolist() == [35.106, 0, 11.342]
 
 
+@pytest.mark.parametrize("head", ["", "x y\n", "# x y\n", "#x y\n", "made by a plotter\nx   y\n"])
+def test_columns_between_blanks(tmp_path, head):
+    path = tmp_path / "a.dat"
+    path.write_text(head + "  0,5  1\n 1,5   2\n")
+    table = read_numbers_table(path)
+    assert values(table).tolist() == [[0.5, 1], [1.5, 2]] and table.header == (("x", "y") if head else ())
+
+
 def test_the_header_is_the_row_that_numbers_follow_and_units_may_stand_below_it():
     table = read_numbers_table(PEOPLE / "units_in_second_row.csv")
     assert table.header[3:] == ("Tensile strain", "Tensile stress") and table.units[3:] == ("(%)", "(kPa)")

@@ -29,7 +29,7 @@ def test_a_bare_csv_becomes_a_folder_that_reads_back(helix, tmp_path, caplog):
     caplog.set_level("INFO", "pneunet")
     design = run_design(helix, tmp_path / "out", ToyLaw())
     out = tmp_path / "out"
-    assert any("simple automatic split" in line for line in caplog.messages)
+    assert any("automatic split" in line for line in caplog.messages)
     again = read_design_file(out / "design.toml")
     assert again.manipulator == design.manipulator and again.target == "target.csv"
     assert again.pressure == pytest.approx(design.content.pressure, rel=1e-12)
@@ -45,7 +45,7 @@ def test_a_bare_csv_becomes_a_folder_that_reads_back(helix, tmp_path, caplog):
         "eq27_sum_mm2"
     ] == pytest.approx(errors.eq27, rel=1e-6)
     assert {"hausdorff_mm", "tip_mm", "length_mismatch_mm"} <= set(written)
-    assert "simple automatic split" in again.result["split"] and again.result["piece"][0]["kind"] == "helical"
+    assert "automatic split" in again.result["split"] and again.result["piece"][0]["kind"] == "helical"
     assert json.loads((out / "run.json").read_text())["inputs"]["law"] == "toy"
 
 

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from pneunet.base import se3
-from pneunet.base.curve import Curve
 from pneunet.base.strains import helix_frenet
 from pneunet.design.target.extraction import extract, fit_arc, turn_about_axis
 from pneunet.design.target.file import SHIPPED, read_target
-from pneunet.design.target.segmentation import split
 from pneunet.design.target.target import Piece, Target
 
 
@@ -97,14 +95,3 @@ def test_frames_show_every_twist():
     first, _, last = extract(Target(poses[:, :3, 3], frames=poses[:, :3, :3], pieces=pieces), pieces)
     assert first.twist == pytest.approx(0.02, abs=1e-4) and last.twist == pytest.approx(-0.03, abs=1e-4)
     assert first.twist_seen and last.twist_seen
-
-
-def test_simple_split_of_the_octopus():
-    pieces = split(read_target(SHIPPED / "octopus.csv").curve)
-    assert [p.kind for p in pieces] == ["twisting", "bending", "helical"]
-    assert [p.length for p in pieces] == pytest.approx([50, 30, 100], abs=2)
-
-
-def test_simple_split_of_one_helix_is_one_piece():
-    pieces = split(Curve(rod((90, -0.02, 0.03))[:, :3, 3]))
-    assert [p.kind for p in pieces] == ["helical"]

@@ -5,14 +5,15 @@ import pytest
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.design.search.aims import EQ27
 from pneunet.design.search.inverse import search
 from pneunet.design.search.lookup import count_for
-from pneunet.design.search.problem import EQ27
-from pneunet.design.search.space import Variable
-from pneunet.design.target.extraction import extract
+from pneunet.design.search.possible import out_of_reach, reaches
+from pneunet.design.search.space import RANGES
+from pneunet.design.target.extraction import Extracted, extract
 from pneunet.design.target.metrics import compare
 from pneunet.design.target.target import Piece, Target
-from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.parameters import ONE_SIDED, Manipulator, Segment
 from pneunet.reduced import predict
 from tests.design.toy_law import ToyLaw
 
@@ -36,9 +37,10 @@ def made(segments, pressure=0.04, pose=None):
 
 def designed(target, objective="paired", law=None):
     law = law or ToyLaw()
-    solution = search(target, extract(target, target.pieces), law, objective)
-    line = predict(solution.manipulator, solution.pressure, law, 0.5, solution.base_pose)
-    return solution, compare(line.points, target.points), line
+    solution = search(target, extract(target, target.pieces), law, objective, alternatives=0)
+    best = solution.best
+    line = predict(best.manipulator, best.pressure, law, 0.5, best.base_pose)
+    return best, compare(line.points, target.points), line
 
 
 def test_real_numbers_of_chambers_agree_with_segment_at_whole_ones():
@@ -102,26 +104,21 @@ def test_frames_are_followed():
     assert np.allclose(found.poses[-1, :3, :3], line.poses[-1, :3, :3], atol=0.05)
 
 
-def test_a_range_grows_when_the_optimum_sits_on_its_bound():
-    at_bound = Variable("chamber_height", 0, 5.0, 3.0, 5.0, 2.0, 8.0)
-    assert at_bound.grown.high == 7.0 and at_bound.grown.low == 3.0
-    assert replace(at_bound, value=4.0).grown == replace(at_bound, value=4.0)
-    assert replace(at_bound, high=8.0, value=8.0).grown.high == 8.0
-    line, pieces = made((replace(BENDING, chamber_height=6.5, chambers=8),), pressure=0.05)
-    solution, errors, _ = designed(Target(line.points, pieces=pieces, pressure_range=(0.03, 0.03)))
-    assert errors.rms < 0.1 and solution.manipulator.segments[0].chamber_height > 5
-    assert "segment 1 chamber_height" in solution.grown
-
-
-def test_bounds_that_may_not_grow_are_named():
+def test_active_bounds_are_named_with_what_they_cost():
     line, pieces = made((replace(BENDING, chambers=8),), pressure=0.05)
     target = Target(
         line.points, pieces=pieces, pressure_range=(0.01, 0.02), vary={"chamber_height": (3.0, 4.0)}
     )
-    solution, errors, _ = designed(target)
-    assert solution.pressure == pytest.approx(0.02, rel=1e-2) and errors.rms > 0.5
-    assert "pressure = 20 kPa (upper bound)" in solution.active
-    assert "segment 1 chamber_height = 4 mm (upper bound)" in solution.active and solution.grown == ()
+    found = search(target, extract(target, target.pieces), ToyLaw(), alternatives=0)
+    assert found.best.pressure == pytest.approx(0.02, rel=1e-2) and found.best.rms > 0.5
+    of_pressure = next(text for text in found.active if text.startswith("pressure = 20 kPa (upper bound); "))
+    assert any(text.startswith("segment 1 chamber_height = 4 mm (upper bound); ") for text in found.active)
+    assert found.stopped_by == found.active[0]
+    # 1 kPa more saves what it says, to first order
+    wider = replace(target, pressure_range=(0.01, 0.0205))
+    saved = found.best.rms - search(wider, extract(target, target.pieces), ToyLaw(), alternatives=0).best.rms
+    told = float(of_pressure.split("would save ")[1].split()[0])
+    assert 2 * saved == pytest.approx(told, rel=0.1)
 
 
 def test_eq27_objective_is_the_papers_sum():
@@ -156,3 +153,20 @@ def test_what_cannot_be_built_is_said():
         designed(Target(line.points, pieces=pieces, vary={"angle": (10.0, 20.0)}))
     with pytest.raises(InputError, match="objective = 'best' is not known"):
         designed(Target(line.points, pieces=pieces), objective="best")
+
+
+def test_what_no_allowed_dimensions_reach_is_said():
+    law = ToyLaw()
+    target = Target(np.column_stack([10.0 * np.arange(9), np.zeros((9, 2))]), pressure_range=(0.02, 0.02))
+    like = Extracted("bending", 40.0, 0.0, 0.0, 0.0)
+    most = 0.01 / min(float(found.share(0.01, 0.0)) for found in reaches(target, like, law))
+    # the toy bends with height over the root of the base: the largest height at the thinnest base
+    heights, bases = (RANGES[ONE_SIDED][name][0] for name in ("chamber_height", "base_thickness"))
+    toy = 0.04 * 0.4 * heights[1] / 4 * (2 / bases[0]) ** 0.5
+    assert most == pytest.approx(toy / (1 + 0.04 * 0.4), rel=1e-9)
+    pieces = [replace(like, curvature=c) for c in (0.9 * most, 1.5 * most)]
+    pieces.append(Extracted("helical", 40.0, 0.03, 0.001, 0.0))
+    assert list(out_of_reach(target, pieces, law)) == [
+        "piece 2 is out of reach: it asks for 150 % of the most that allowed dimensions do at 20 kPa",
+        "piece 3 is out of reach: no allowed angle twists so much for its curvature",
+    ]

@@ -36,6 +36,24 @@ def test_bare_columns_and_named_ones_say_the_same(tmp_path):
     assert read_target(bare).name == "bare"
 
 
+@pytest.mark.parametrize(
+    "head, row",
+    [
+        ("X [mm];Y [mm];Z [mm]\n", "{0},5;1;0\n"),
+        ("Take 3; 2026-11-27\n\nX;Y;Z\nm;m;m\n", "{0}e-3;1e-3;0\n"),
+        ("t (s)\tPosition X (cm)\tPosition Y (cm)\tPosition Z (cm)\n", "{0}\t{0}e-1\t1e-1\t0\n"),
+        ("Points:0,Points:1,Points:2\n", "{0}.0,1,0\n"),
+        ("# x y z\n", "{0} 1 0\n"),
+        ("", "  {0}   1   0\n"),
+    ],
+)
+def test_what_trackers_and_cad_write(tmp_path, head, row):
+    rows = [10 * i + 10 for i in range(6)]
+    points = read_target(csv(tmp_path, head + "".join(row.format(x) for x in rows))).points
+    assert points[:, 1:] == pytest.approx(np.array([[1, 0]] * 6))
+    assert points[:, 0] == pytest.approx(np.array(rows) + 0.5 * (",5" in row))
+
+
 def test_frames_by_columns(tmp_path):
     text = "x_mm,y_mm,z_mm,t1x,t1y,t1z,t2x,t2y,t2z\n" + "".join(
         f"{9 * i},0,0,1,0,0,0,0,1\n" for i in range(5)
@@ -140,7 +158,10 @@ PIECE = '[[piece]]\nkind = "{}"\nlength_mm = 50\n{}'
         ('target = "squid"', "'squid' is not shipped: shipped are octopus, pear, tentacle2, vase"),
         ('target = "vase"\npoints = "curve.csv"', "exclude each other"),
         ('points = "curve.csv"\n[piece]\nkind = "bending"', "double brackets"),
-        ('points = "curve.csv"\n' + PIECE.format("curly", ""), "write 'twisting', 'bending' or 'helical'"),
+        (
+            'points = "curve.csv"\n' + PIECE.format("curly", ""),
+            "write 'passive', 'twisting', 'bending' or 'helical'",
+        ),
         ('points = "curve.csv"\n[[piece]]\nkind = "bending"', "key 'length_mm' is missing"),
         (
             'points = "curve.csv"\n' + PIECE.format("bending", "").replace("50", "70"),

@@ -3,7 +3,12 @@
 import numpy as np
 
 from pneunet.base.errors import ConvergenceError
+from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.rod.laws import FreeSection, SegmentLaw
+from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
+
+#: what its strains depend on besides the pressure, and an imaginary step for derivatives
+OF_SHAPE, STEP = ("angle", "chamber_height", "base_thickness"), 1e-30j
 
 
 class ToyLaw(SegmentLaw):
@@ -15,6 +20,28 @@ class ToyLaw(SegmentLaw):
     def of(self, segment):
         return ToySection(segment, self.limit)
 
+    def each_with_slopes(self, segments, pressure, names=SHAPE):
+        pressures = np.broadcast_to(pressure, len(segments))
+        q, slopes = self.each(segments, pressures).vector, np.zeros((len(segments), 6, len(VARIABLES)))
+        places = [VARIABLES.index(name) for name in (*OF_SHAPE, "pressure")]
+        for segment, P, rows in zip(segments, pressures, slopes):
+            values = np.array([*(getattr(segment, name) for name in OF_SHAPE), P], complex)
+            for j, place in enumerate(places):
+                stepped = values + STEP * np.eye(4)[j]
+                rows[:, place] = strains(segment.kind, *stepped).imag / STEP.imag
+        return StatesWithSlopes.of_strains(q, slopes)
+
+
+def strains(kind, angle, chamber_height, base_thickness, P):
+    """(6,)"""
+    angle, load = angle * np.pi / 180, P / 0.05
+    if kind == "twisting":
+        k1 = 0.035 * load * np.sin(2 * angle) * (chamber_height / 5.5) ** 0.5
+        return np.array([1 + 0.1 * load, 0, 0, k1, 0, 0])
+    k = 0.04 * load * chamber_height / 4 * (2 / base_thickness) ** 0.5
+    lean, k1, k2 = -0.01 * load * np.cos(angle), k * np.sin(angle) * np.cos(angle), k * np.sin(angle) ** 2
+    return np.array([1 + 0.04 * load, lean, 0, k1, k2, 0])
+
 
 class ToySection(FreeSection):
     def __init__(self, segment, limit):
@@ -24,11 +51,5 @@ class ToySection(FreeSection):
     def free_strains(self, P):
         if P > self.limit:
             raise ConvergenceError(f"toy law: no equilibrium beyond {1e3 * self.limit:g} kPa")
-        segment, load = self.segment, P / 0.05
-        angle = np.radians(segment.angle)
-        if segment.kind == "twisting":
-            k1 = 0.035 * load * np.sin(2 * angle) * (segment.chamber_height / 5.5) ** 0.5
-            return np.array([1 + 0.1 * load, 0, 0, k1, 0, 0])
-        k = 0.04 * load * segment.chamber_height / 4 * (2 / segment.base_thickness) ** 0.5
-        lean, k1, k2 = -0.01 * load * np.cos(angle), k * np.sin(angle) * np.cos(angle), k * np.sin(angle) ** 2
-        return np.array([1 + 0.04 * load, lean, 0, k1, k2, 0])
+        segment = self.segment
+        return strains(segment.kind, *(getattr(segment, name) for name in OF_SHAPE), P)

@@ -1,5 +1,7 @@
 """design.toml: complete and re-runnable, and strict about what it does not know."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,6 +65,37 @@ def test_a_design_reads_back_as_it_was(tmp_path):
     first = path.read_text()
     write_design_file(path, back)
     assert path.read_text() == first
+
+
+def test_rolls_passive_segments_and_pressures_of_groups_read_back(tmp_path):
+    path, bend = tmp_path / "design.toml", Segment("one-sided", 90.0, 4, material=MATERIAL)
+    other = replace(bend, roll=180, group=2)
+    design = DesignFile(Manipulator((bend.plain(12.5), bend, other)), (0.02, 0.0))
+    write_design_file(path, design)
+    text = path.read_text()
+    assert "pressure_kPa = [20.0, 0.0]" in text and text.count("roll_deg = 180\npressure_group = 2") == 1
+    passive = text[text.index("[[segment]]") : text.index("[[segment]]", text.index("[[segment]]") + 1)]
+    assert "plain_length_mm = 12.5" in passive and "chamber" not in passive and "angle" not in passive
+    back = read_design_file(path)
+    assert back.manipulator == design.manipulator and back.pressure == (0.02, 0.0)
+    assert back.largest_pressure == 0.02 and back.scaled(0.01) == (0.01, 0.0)
+    path.write_text(text.replace("[20.0, 0.0]", "15"))
+    assert read_design_file(path).pressure == 0.015 and read_design_file(path).scaled(0.01) == 0.01
+    for old, new, message in (
+        ("[20.0, 0.0]", "[20, 0, 5]", "one for all, or one for each of the 2 groups, not 3"),
+        ("[20.0, 0.0]", "[20, -1]", r"pressure_kPa = -1 must lie in 0\.\.2000 kPa"),
+        ("[20.0, 0.0]", '[20, "a"]', "'pressure_kPa' must be a finite number, not 'a'"),
+        ("[20.0, 0.0]", "[0, 0]", "pressure_kPa = 0 leaves nothing to solve"),
+        (
+            "plain_length_mm = 12.5",
+            "plain_length_mm = 9\nwall_mm = 1",
+            "1: wall_mm: a passive segment has no",
+        ),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=message) as error:
+            read_design_file(path)
+        assert "\n" not in str(error.value)
 
 
 def test_loads_turn_with_the_base():

@@ -9,15 +9,17 @@ from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import Manipulator, Segment
 from pneunet.geometry.reference_cases import CASES
+from pneunet.geometry.sections import channel_section, core_section, whole_section
 
 ONE_SIDED, TWISTING = Segment("one-sided", 60.0, 3), Segment("twisting", 60.0, 3)
 PAPER = NeoHookean(mu=50.0, name="paper")
+BARE = {"kind": "passive", "angle": 90.0, "chambers": 0, "plain_length": 20.0}
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kind": "bending"}, "kind = 'bending' .*'one-sided' or 'twisting'"),
+        ({"kind": "bending"}, "kind = 'bending' .*'one-sided', 'twisting' or 'passive'"),
         ({"angle": 29.9}, r"angle_deg = 29.9 must lie in 30\.\.150"),
         ({"angle": 151.0}, "angle_deg = 151 "),
         ({"angle": float("nan")}, "angle_deg = nan "),
@@ -48,6 +50,14 @@ PAPER = NeoHookean(mu=50.0, name="paper")
             "layer_thickness_mm = 0.5: only a one-sided segment",
         ),
         ({"angle": 90.0, "gap": 4.0}, r"end_margin_mm = 2 .* at least 2\.5 mm is needed with gap_mm = 4"),
+        ({"roll": 45}, "roll_deg = 45 is not known: write 0, 90, 180 or 270"),
+        ({"group": 0}, r"pressure_group = 0 must lie in 1\.\.9"),
+        ({"plain_length": 9.0}, "plain_length_mm = 9: only a passive segment"),
+        ({"kind": "passive"}, "angle_deg, chambers: a passive segment has no chambers: leave this out"),
+        ({**BARE, "wall": 1.5}, "^wall_mm: a passive segment has no chambers: leave this out"),
+        ({**BARE, "plain_length": 0.0}, "plain_length_mm = 0: give the length of the passive segment"),
+        ({**BARE, "channel_width": 12.0}, "channel_width_mm = 12 is not less than width_mm = 12"),
+        ({**BARE, "end_margin": 0.4}, "end_margin_mm = 0.4 must be at least 0.5"),
     ],
 )
 def test_segments_that_cannot_be_built_are_refused(change, message):
@@ -139,6 +149,64 @@ def test_joints_that_do_not_fit_are_refused():
     low = replace(ONE_SIDED, base_thickness=5.0, roof=0.3, channel_height=1.0, cavity_floor=0.5)
     with pytest.raises(InputError, match="segment 1 and 2: the channel"):
         Manipulator((ONE_SIDED, low))
+
+
+def test_a_passive_segment_has_the_core_of_what_it_goes_with():
+    plain = ONE_SIDED.plain(20.0)
+    assert (plain.length, plain.active_length, plain.end_length) == (20.0, 0.0, 10.0)
+    assert len(plain.chamber_positions) == len(plain.sides) == 0 and plain.chamber_top == plain.core_top
+    for s in (ONE_SIDED, TWISTING, replace(ONE_SIDED, roll=90, layer_thickness=0.5, layer_material=PAPER)):
+        plain = s.plain(20.0)
+        assert (core_section(plain) == core_section(s)).all() and plain.plain(20.0) == plain
+        assert (channel_section(plain) == channel_section(s)).all() and plain.layer_top == s.layer_top
+        assert plain.key == replace(plain, plain_length=50.0, roll=0).key
+
+
+def test_a_roll_turns_the_section_right_handedly_and_leaves_the_cell():
+    """Chambers up to z = 6: below at 180, at -y at 90, at +y at 270; in the mirror y = 0 the last two change
+    places."""
+    sections = {
+        0: [[-6, 6], [-3, 6]],
+        90: [[-6, 3], [-6, 6]],
+        180: [[-6, 6], [-6, 3]],
+        270: [[-3, 6], [-6, 6]],
+    }
+    for roll, section in sections.items():
+        s = replace(ONE_SIDED, roll=roll)
+        assert whole_section(s).tolist() == section and s.key == ONE_SIDED.key
+        assert whole_section(s.mirrored).tolist() == [[-section[0][1], -section[0][0]], section[1]]
+
+
+def test_rolled_joints_fit_where_either_channel_stays_covered():
+    assert Manipulator((ONE_SIDED, replace(ONE_SIDED, roll=180)))
+    across = {"width": 10.0, "channel_width": 2.0}
+    assert Manipulator((replace(ONE_SIDED, **across), replace(ONE_SIDED, **across, roll=270)))
+    with pytest.raises(InputError, match="the channel .* when they are rolled by 0 and 90 deg"):
+        Manipulator((ONE_SIDED, replace(ONE_SIDED, roll=90)))
+    thin = replace(ONE_SIDED, roof=0.4, chamber_height=5.0)
+    with pytest.raises(InputError, match="segment 1 and 2: the channel .* 0 and 180 deg"):
+        Manipulator((replace(ONE_SIDED, channel_height=3.0), replace(thin, roll=180)))
+
+
+def test_groups_are_neighbours_with_chambers_and_a_cavity_each():
+    one, two = ONE_SIDED, replace(ONE_SIDED, group=2)
+    body = Manipulator((one.plain(10.0), one, two, two.plain(20.0)))
+    assert body.groups == ((0, 1), (2, 3))
+    middle, wall = 10.0 + one.length, one.end_wall
+    ends = [[2.0, middle - wall], [middle + wall, body.length - 2.0]]
+    np.testing.assert_allclose(body.channels, ends, rtol=1e-14)
+    assert body.ports == pytest.approx([p + one.chamber_positions[0] for p in (10.0, middle)])
+    assert body.pressures((3.0, 4.0)).tolist() == [3.0, 3.0, 4.0, 4.0] and (body.pressures(2.0) == 2.0).all()
+    with pytest.raises(InputError, match="give one for all, or one for each of the 2 groups, not 3"):
+        body.pressures((1.0, 2.0, 3.0))
+    with pytest.raises(InputError, match="pressure_kPa: give one, not 2"):
+        Manipulator((one,)).pressures((1.0, 2.0))
+    with pytest.raises(InputError, match="segment 1: pressure_group = 2: .* in order from 1: write 1$"):
+        Manipulator((two,))
+    with pytest.raises(InputError, match="segment 3: pressure_group = 1: .*: write 2 or 3"):
+        Manipulator((one, two, one))
+    with pytest.raises(InputError, match="pressure_group = 2: none of its segments has chambers"):
+        Manipulator((one, two.plain(20.0)))
 
 
 def test_reference_cases_have_the_heights_and_pitches_of_their_table():

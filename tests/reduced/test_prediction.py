@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneunet.base import se3
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import Manipulator, Segment
@@ -15,12 +16,15 @@ from pneunet.reduced import (
     Rod,
     SectionLaw,
     SegmentLaw,
+    body_surface,
     doubts,
     predict,
     shipped_law,
 )
+from pneunet.reduced.rod.areas import passive_mass
 from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import FreeSection
+from pneunet.reduced.rod.quadratic import passive_law
 
 TWISTING = Segment("twisting", 60.0, 4, cavity_floor=0.5)
 BENDING = Segment("one-sided", 90.0, 3)
@@ -80,11 +84,59 @@ def test_a_free_rod_and_a_prediction_are_the_same(name):
     np.testing.assert_allclose(rod.free_strains.vector, known, rtol=0, atol=1e-10)
 
 
-def test_laws_may_be_one_for_each_segment():
+def test_laws_may_be_one_for_each_segment_and_pressures_one_for_each_group():
     laws = [shipped_law(), QUADRATIC, AnalyticLaw()]
-    free = Rod.of(ARM, laws, [0.01, 0.02, 0.03]).free_strains.vector[1::3]
-    expected = [law.strains(s, P).vector for law, s, P in zip(laws, ARM.segments, (0.01, 0.02, 0.03))]
+    body = Manipulator([replace(s, group=i) for s, i in zip(ARM.segments, (1, 2, 2))])
+    free = Rod.of(body, laws, [0.01, 0.02]).free_strains.vector[1::3]
+    expected = [law.strains(s, P).vector for law, s, P in zip(laws, ARM.segments, (0.01, 0.02, 0.02))]
     assert free == pytest.approx(np.array(expected))
+    line = predict(body, (0.01, 0.02), shipped_law(), 2.0)
+    assert np.array_equal(line.poses, Rod.of(body, shipped_law(), (0.01, 0.02)).free(2.0).poses)
+    with pytest.raises(InputError, match="one for all, or one for each of the 2 groups, not 3"):
+        predict(body, (0.01, 0.02, 0.03), shipped_law())
+
+
+@pytest.mark.parametrize("roll", [90, 180, 270])
+def test_a_rolled_segment_is_the_unrolled_one_turned_about_the_axis(roll):
+    body, turned = Manipulator((HELICAL,)), Manipulator((replace(HELICAL, roll=roll),))
+    rotation = np.round(se3.exp_pose([np.radians(roll), 0, 0, 0, 0, 0]))
+    for law in (shipped_law(), AnalyticLaw()):
+        points, expected = (predict(b, 0.03, law).points for b in (turned, body))
+        np.testing.assert_allclose(points, se3.transform(rotation, expected), rtol=0, atol=1e-13)
+        own, other = (body_surface(b, 0.03, law, 4.0)[0] for b in (body, turned))
+        np.testing.assert_allclose(other, se3.transform(rotation, own), rtol=0, atol=1e-12)
+    gravity, force = np.array([2e3, -3e3, 5e3]), np.array([0.01, -0.004, 0.006])
+    loads = [DeadLoads(tuple(r @ gravity), tuple(r @ force)) for r in (np.eye(3), rotation[:3, :3])]
+    tips = [Rod.of(b, shipped_law(), 0.03).equilibrium(each).tip for b, each in zip((body, turned), loads)]
+    np.testing.assert_allclose(tips[1], rotation @ tips[0] @ rotation.T, rtol=0, atol=1e-9)
+    assert np.linalg.norm(tips[0][:3, 3] - points[-1]) > 1
+
+
+def test_a_bend_and_a_rolled_bend_are_an_s_in_the_plane():
+    """Two mirror images at the plane z = 0: the tip points along the base's axis again, out of its line by
+    twice the first arc's height and what the straight ends between add."""
+    straight = replace(BENDING, base_thickness=BENDING.roof)
+    line = predict(Manipulator((straight, replace(straight, roll=180))), 0.03, AnalyticLaw())
+    np.testing.assert_allclose(line.poses[:, 1, 3], 0, atol=1e-12)
+    np.testing.assert_allclose(line.poses[-1, :3, :3], np.eye(3), atol=1e-12)
+    middle = line.at([straight.length])[0]
+    turn = np.arctan2(-middle[2, 0], middle[0, 0])
+    assert turn > 0.3 and line.points[-1] == pytest.approx(2 * middle[:3, 3], abs=1e-9)
+
+
+def test_a_passive_segment_stays_straight_and_bends_under_load_as_its_core_does():
+    plain = HELICAL.plain(30.0)
+    body = Manipulator((plain, HELICAL))
+    line = predict(body, 0.03, shipped_law(), 3.0)
+    np.testing.assert_allclose(line.at([30.0])[0], se3.make_pose(np.eye(3), [30.0, 0, 0]), atol=1e-12)
+    alone = predict(Manipulator((HELICAL,)), 0.03, shipped_law())
+    np.testing.assert_allclose(line.points[-1], alone.points[-1] + [30, 0, 0], atol=1e-9)
+    assert doubts(body, 0.03, shipped_law()) == doubts(Manipulator((HELICAL,)), 0.03, shipped_law())
+    rod, core = Rod.of(body, shipped_law(), 0.03), passive_law(HELICAL).stiffnesses[0]
+    assert all((piece.law.stiffness(np.eye(6)[0], 0.03) == core).all() for piece in rod.pieces[:3])
+    assert {(p.mass, p.mass_centre) for p in rod.pieces[:3]} == {
+        (passive_mass(HELICAL)[0], (0.0, passive_mass(HELICAL)[1]))
+    }
 
 
 def test_a_law_of_free_shapes_alone_says_so_when_it_is_asked_for_more():

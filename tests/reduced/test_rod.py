@@ -1,6 +1,8 @@
 """The loaded rod: exact derivatives, the elastica, a helix under a tip moment, objectivity, order, load
 steps, buckling, bad input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
@@ -281,9 +283,10 @@ class TestOfAManipulator:
         whole = Rod.of(self.body, self.laws, 0.02)
         assert whole.lengths[[1, 4]] == pytest.approx([3 * self.body.segments[0].pitch, 4 * 5.0])
 
-    def test_each_segment_may_have_its_own_pressure(self):
+    def test_each_group_may_have_its_own_pressure(self):
         states = QuadraticLaw([0.0, 0.05], [REST, [1.1, 0, 0, 0.04, 0, 0]], [SLENDER, 2 * SLENDER])
-        rod = Rod.of(self.body, states, (0.01, 0.03))
+        first, second = self.body.segments
+        rod = Rod.of(Manipulator((first, replace(second, group=2))), states, (0.01, 0.03))
         assert rod.free_strains.k[:, 0] == pytest.approx([0, 0.008, 0, 0, 0.024, 0])
 
     def test_passive_pieces_yield_to_loads_less_than_soft_active_ones(self):
@@ -346,7 +349,7 @@ BAD = {
     "no laws": (lambda: Rod.of(TestOfAManipulator.body, 3.0, 0.0), "laws: float is no SegmentLaw"),
     "pressures": (
         lambda: Rod.of(TestOfAManipulator.body, law(), (0.0, 0.0, 0.0)),
-        "one for all or one for each of the 2 segments",
+        "pressure_kPa: give one, not 3",
     ),
     "states": (lambda: QuadraticLaw([0.02, 0.01], [REST] * 2, [SLENDER] * 2), "increasing pressures"),
     "unsymmetric": (lambda: law(stiffness=SLENDER + np.eye(6, k=1)), "finite and symmetric"),

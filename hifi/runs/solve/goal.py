@@ -25,14 +25,15 @@ class Goal:
 
     @classmethod
     def of(cls, design: DesignFile, pressure: float | None = None) -> "Goal":
-        """The design's, or another pressure (MPa); InputError when that makes no sense."""
+        """The design's, or another pressure (MPa; of several groups the largest); InputError when that makes
+        no sense."""
         control = design.control
         if control.name != "pressure" and pressure is not None:
             raise InputError(
                 f'--pressure-kPa does not go with the design\'s control = "{control.name}": change that in'
                 " the design"
             )
-        pressure = design.pressure if pressure is None else pressure
+        pressure = design.largest_pressure if pressure is None else pressure
         if pressure == 0 and not design.loads:
             raise InputError(
                 "pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads] in the design"

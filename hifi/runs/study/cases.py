@@ -67,7 +67,7 @@ class _Levels:
 
     def __init__(self, directory, design, number):
         self.directory, self.breaks_at = directory, break_stretch(design.manipulator)
-        self.marks = tuple(np.linspace(0.0, design.pressure, number + 1)[1:])
+        self.marks = tuple(np.linspace(0.0, design.largest_pressure, number + 1)[1:])
         self.rows, self.factorisations = {}, 0
 
     def accepted(self, m):

@@ -1,0 +1,81 @@
+"""What a rod is to meet: points at given fractions of its deformed length, and how far it is from them.
+
+Points paired at equal fractions of arc length are the default. It bounds the paper's Eq. 27 from above, since
+a nearest point is no farther than the paired one, and unlike Eq. 27 it is not lowered by a manipulator that
+is too long.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneunet.base import se3
+from pneunet.design.target.target import Target
+from pneunet.reduced.rod.placing import Placed, PlacedRod
+
+PAIRED, EQ27 = "paired", "eq27"
+OBJECTIVES = (PAIRED, EQ27)
+PAIRS = 101
+#: samples of a rod that nearest points are sought between
+FINE = 401
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """points (s, 3) in mm at fractions (s,) of the deformed length; edges (s, 3, 2) or None: the section's
+    width and height directions there, times half a width in mm. nearest: the fractions are those of the
+    nearest points instead."""
+
+    fractions: np.ndarray
+    points: np.ndarray
+    edges: np.ndarray | None = None
+    half_width: float = 0.0
+    nearest: bool = False
+
+    @classmethod
+    def of(cls, target: Target, width: float, objective: str = PAIRED) -> "Aim":
+        """What a Target asks of a body of a width in mm."""
+        if objective == EQ27:
+            return cls(np.zeros(len(target.points)), target.points, nearest=True)
+        fractions = np.linspace(0, 1, PAIRS)
+        if target.frames is None:
+            return cls(fractions, target.curve.evenly(PAIRS))
+        s = target.curve.arc_lengths
+        closest = np.abs(s[:, None] - fractions * s[-1]).argmin(axis=0)
+        edges = width / 2 * target.frames[closest][:, :, 1:3]
+        return cls(fractions, target.curve.evenly(PAIRS), edges, width / 2)
+
+    def stations(self, rod: PlacedRod) -> Placed:
+        """Where the rod is that is to meet the points."""
+        if not self.nearest:
+            return rod.at(self.fractions)
+        fine = np.linspace(0, 1, FINE)
+        return rod.at(_nearest(rod.points(fine), fine, self.points), sliding=False)
+
+    def misfit(self, placed: Placed) -> np.ndarray:
+        """(r,) in mm, whose squared norm is the mean squared distance."""
+        parts = [(placed.points - self.points).ravel()]
+        if self.edges is not None:
+            parts.append((self.half_width * placed.poses[:, :3, 1:3] - self.edges).ravel())
+        return np.concatenate(parts) / np.sqrt(len(self.points))
+
+    def slopes(self, placed: Placed, turns: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """(r, n) derivatives of the misfit, of turns and moves (s, 3, n) of the stations as in Placed."""
+        parts = [moves.reshape(3 * len(moves), moves.shape[2])]
+        if self.edges is not None:
+            columns = np.swapaxes(placed.poses[:, :3, 1:3], 1, 2)
+            # a column c changes by turn x c
+            edges = -self.half_width * se3.hat(columns) @ turns[:, None]
+            parts.append(np.moveaxis(edges, 1, 2).reshape(6 * len(moves), moves.shape[2]))
+        return np.vstack(parts) / np.sqrt(len(self.points))
+
+
+def _nearest(line, fractions, points):
+    """Fractions (n,) of the points of a polyline (m, 3), known at its vertices (m,), nearest to points
+    (n, 3)."""
+    start, step = line[:-1], np.diff(line, axis=0)
+    squared = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
+    along = np.clip(np.einsum("nmk,mk->nm", points[:, None] - start, step) / squared, 0, 1)
+    apart = np.sum((points[:, None] - start - along[..., None] * step) ** 2, axis=2)
+    best = np.argmin(apart, axis=1)
+    return fractions[best] + along[np.arange(len(points)), best] * np.diff(fractions)[best]
