@@ -96,6 +96,18 @@ def test_a_bare_number_is_no_pressure():
         predict(FINGER, 30, shipped_law())
 
 
+def test_what_is_none_is_refused(tmp_path):
+    turned_too_far = np.diag([2.0, 2, 2, 1])
+    for pose in (np.eye(3), np.full((4, 4), np.nan), turned_too_far, "here"):
+        with pytest.raises(pn.InputError, match=r"base_pose must be \(4, 4\): a rotation"):
+            pn.predict(FINGER, pressure_kPa=20, base_pose=pose)
+    for target in ("curve.csv", [["a", "b", "c"]] * 5, [[0, 0, 0], [1, 2]]):
+        with pytest.raises(pn.InputError, match="points must be rows of x, y, z in mm, not"):
+            pn.Target(target)
+    with pytest.raises(pn.InputError, match="ranks = 0 must be a whole number, at least 1"):
+        pn.Design.of(FINGER, pressure_kPa=20, law=ToyLaw()).solve(tmp_path, ranks=0)
+
+
 def test_a_law_asked_beyond_its_path_says_so(caplog):
     """It knows no strains there, and gives those at the path's end."""
     from pneunet.reduced import shipped_law

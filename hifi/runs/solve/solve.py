@@ -9,7 +9,7 @@ from typing import Protocol
 
 from mpi4py import MPI
 
-from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.errors import ConvergenceError, InputError, located
 from pneunet.base.files.atomic import room_in
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.reading import read_json
@@ -228,8 +228,11 @@ def _mesh(design, folder, mesh_size):
         "segments": segment_tables(design.manipulator),
     }
     if (folder / MESH).exists():
-        _, facts = read_mesh(folder / MESH)
+        mesh, facts = read_mesh(folder / MESH)
         if wanted == {name: facts.get(name) for name in wanted} and facts == _facts_for_people(folder):
+            body = design.manipulator
+            with located(folder / MESH):
+                mesh.require_tags([s.layer_thickness > 0 for s in body.segments], len(body.groups))
             return facts
     if folder.is_dir() and any(folder.glob("m*")):
         log.info(f"{folder}: no {MESH} of this body and mesh size with its mesh.json: meshed anew")
