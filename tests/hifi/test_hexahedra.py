@@ -7,13 +7,16 @@ import pytest
 from dolfinx.mesh import CellType
 from mpi4py import MPI
 
+from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.geometry.cad.grid import grid_cell
 from pneunet.geometry.grids.body import body_grid
 from pneunet.geometry.parameters import Manipulator
 from pneunet.geometry.reference_cases import CASES
 from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.cell.file import CellCase
 from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.run import solve_cell
 from pneunet.hifi.cell.shape_slopes import ShapeSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.fem import surface
@@ -63,6 +66,17 @@ def test_a_part_of_the_cell_and_half_turns_are_the_cell(name, copies, tmp_path):
     e, k = states[1].strains.e, states[1].strains.k
     zero = [e[2], k[2]] if copies == 2 else [*e[1:], *k[1:]]
     assert not np.any(zero)
+
+
+def test_a_cell_goes_on_whole_with_contact_where_walls_have_touched(tmp_path):
+    """Every level is told once: those before the touch of half a cell, those beyond of the whole."""
+    segment = replace(CASES["one_sided_w10"](60.0, 1), gap=0.1, material=NeoHookean(1.0))
+    case, states, touched = CellCase(segment, 0.03, 6.0, 3, element="hexahedra"), [], []
+    _, facts = solve_cell(case, tmp_path / "cell.npz", states.append, on_touch=touched.append)
+    assert [s.pressure for s in states] == pytest.approx([0, 0.01, 0.02, 0.03])
+    assert 0.01 < touched[0] < 0.02 and len(touched) == 1 and not facts["part"]
+    assert [s.contact is not None for s in states] == [False, False, True, True]
+    assert not any(s.walls_overlap for s in states) and states[-1].contact.force > 0.01
 
 
 def test_all_classes_count_unstable_directions(tmp_path):
