@@ -215,8 +215,7 @@ def _rms(off):
 
 
 def one_marker(measured: Measurement) -> Measurement:
-    """A single marker tells how far it has moved, in no coordinates; other Measurement as they are. InputError
-    where it was not seen at the lowest pressure."""
+    """A single marker tells how far it has moved, in no coordinates; any other Measurement as it is."""
     if measured.what != MARKERS or len(measured.names) > 1:
         return measured
     moved = np.linalg.norm(measured.values - measured.values[0], axis=2, keepdims=True)

@@ -48,14 +48,11 @@ def _shortest(p, q, a, b):
     (_, along), (_, wanted) = _main(p), _main(q)
     if np.sum(p @ along * (q @ wanted)) < 0:
         along = -along
-    cross, cosine = np.cross(along, wanted), float(along @ wanted)
-    sine = np.linalg.norm(cross)
-    if sine < 1e-12 and cosine < 0:  # the other way round: about any direction across
-        cross, sine = np.linalg.svd(along[None])[2][1], 1.0
-        angle = np.pi
-    else:
-        angle = np.arctan2(sine, cosine)
-    R = se3.exp_rotation(cross / sine * angle) if sine > 0 else np.eye(3)
+    cross = np.cross(along, wanted)
+    if np.linalg.norm(cross) < 1e-12:  # about any direction across, by nothing or by half a turn
+        cross = np.linalg.svd(along[None])[2][1]
+    turn = cross / np.linalg.norm(cross) * np.arctan2(np.linalg.norm(np.cross(along, wanted)), along @ wanted)
+    R = se3.exp_rotation(turn)
     return se3.make_pose(R, b - R @ a)
 
 

@@ -61,8 +61,8 @@ class Measurement:
 
 
 def read_measured(path: str | Path) -> Measurement:
-    """The Measurement in a table with a column of pressure and those of markers, of the tip, of a centreline, of
-    an angle or of a displacement. InputError, in one line, where these are missing or in no known unit."""
+    """The Measurement in a table with a column of pressure and those of markers, of the tip, of a centreline,
+    of an angle or of a displacement. InputError, in one line, where these are missing or in no known unit."""
     table = read_numbers_table(path)
     if not table.header:
         raise InputError(f"{path}: has no header: name the columns, for instance pressure_kPa, tip_x_mm, ...")
@@ -109,7 +109,11 @@ def _columns(table: Table):
     several = (
         max(Counter(w.lower() for w, _ in named if w.lower() in ("x", "y", "z")).values(), default=0) > 1
     )
-    pressure, points, scalars, left, bare = [], {}, {}, [], Counter()
+    pressure: list[tuple[int, str]] = []
+    points: dict[str, dict[str, tuple[int, float]]] = {}
+    scalars: dict[str, tuple[int, float]] = {}
+    left: list[str] = []
+    bare: Counter[str] = Counter()
     for i, (name, (word, unit)) in enumerate(zip(table.header, named)):
         angle, point = _ANGLE.fullmatch(name.strip()), _POINT.fullmatch(word)
         if _PRESSURE.fullmatch(word) and unit not in LENGTHS:

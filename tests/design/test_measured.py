@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from examples.measured import arm, beam
 from pneunet.base import se3
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_csv
@@ -221,3 +222,23 @@ def test_the_command_writes_everything_or_nothing(tmp_path, caplog):
     assert written >= {"compare.csv", "compare.png", "run.json", "fitted.toml"}
     fitted = read_design_file(tmp_path / "run" / "compare" / "fitted.toml")
     assert fitted.largest_pressure == pytest.approx(0.024 * FACTOR, rel=1e-5)
+
+
+def test_the_beam_of_the_public_measurement_is_timoshenkos():
+    """Small drops: Euler and Bernoulli's and that of the shear. Finite elements of it: `make bench
+    ONLY=compare`."""
+    weight, shear = beam.DENSITY * beam.SIDE**2 * 9810, 5 / 6 * beam.MU * beam.SIDE**2
+    drop = beam.euler_bernoulli(0.0) + weight * beam.LENGTH**2 / (2 * shear)
+    assert beam.rod_drop(0.0) == pytest.approx(drop, rel=0.01)
+    told = beam.lines()
+    assert "does not agree" in told[0] and all("rod" in line for line in told)
+    low, high = beam.MEASURED[0.991]
+    assert low < beam.rod_drop(0.991) < high
+
+
+def test_the_arm_of_the_public_measurement_is_no_one_arc():
+    t = np.radians(arm.TILT_DEG)
+    length = arm.arc_lengths()
+    x, z = length * np.sin(t) / t - length, length * (1 - np.cos(t)) / t
+    assert np.allclose(np.hypot(x, z), arm.DISPLACEMENT_MM)
+    assert np.ptp(length) > 5 and "not published" in arm.lines()[-1]
