@@ -15,6 +15,7 @@ from pathlib import Path
 from benchmarks import (
     cell,
     chain,
+    compare,
     contact,
     contact_page,
     door,
@@ -94,6 +95,10 @@ PARTS = {
         "the split of 200 random targets against the pieces that they are made of; some 30 seconds",
     ),
     "people": (people.people, "files as people bring them against the right answer of each; some minutes"),
+    "compare": (
+        compare.compare,
+        "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
+    ),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "remeshed": (
         remeshed.remeshed,

@@ -215,6 +215,20 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("directory", type=path)
     add_law(a, None)
 
+    a = add(
+        "compare", "a measurement over pressure beside its prediction, and the modulus that it speaks for"
+    )
+    a("run", type=path, metavar="RUN", help="a design's folder, or its design.toml")
+    text = "markers, tip, centreline, angle or displacement over pressure (docs/use-compare.md)"
+    a("measured", type=path, metavar="MEASURED.csv", help=text)
+    text = "where markers sit on the body at rest: marker, x_mm, y_mm, z_mm"
+    a("--markers", type=path, metavar="MARKERS.csv", help=text)
+    a("--fit-wall", action="store_true", help="fit the thickness of the walls beside the modulus")
+    text = "the coordinates are the target's already: register nothing"
+    a("--as-is", action="store_true", help=text)
+    add_law(a, None)
+    add_output(a, "compare/ in the design's folder")
+
     a = add("fit-material", "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
     a("test", type=path, metavar="TENSILE.csv")
     text = "neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them"
