@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from pneunet.front import rod as rod
     from pneunet.front import segment as segment
     from pneunet.geometry.loading import DeadLoads as DeadLoads
+    from pneunet.geometry.moulds.parameters import Moulds as Moulds
     from pneunet.geometry.parameters import Manipulator as Manipulator
     from pneunet.geometry.parameters import Segment as Segment
     from pneunet.reduced.rod.centreline import Centreline as Centreline
@@ -59,6 +60,7 @@ _PLACES = {
     "Design": "design.design",
     "InputError": "base.errors",
     "Manipulator": "geometry.parameters",
+    "Moulds": "geometry.moulds.parameters",
     "Results": "base.files.results",
     "Rod": "reduced.rod.rod",
     "RodPiece": "reduced.rod.rod",
