@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from pneunet.design.report.rundata import Solution
     from pneunet.design.search.inverse import Candidate
     from pneunet.design.search.tolerances import Tolerances
+    from pneunet.geometry.moulds.parameters import Moulds
 
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
@@ -209,6 +210,25 @@ class Design:
         from pneunet.design.report.pictures import design_figure
 
         return design_figure(self.content, self.prediction, self.target, self.errors)
+
+    def export(self, directory: str | Path, moulds: "Moulds | str | Path | None" = None) -> Path:
+        """Write what a workshop needs to cast it to directory/workshop, the path of which is returned: STEP
+        and STL of the body and its moulds, a sheet as HTML and PDF.
+
+        moulds: printer, draft, clearances, ..., or a TOML file of them. A finite element solution of this
+        body in the folder tells the limits of the pressure. InputError where moulds or files are wrong.
+        """
+        from pneunet.design.report.rundata import read_design_folder
+        from pneunet.design.workshop.export import read_moulds, write_pack
+
+        if isinstance(moulds, (str, Path)):
+            moulds = read_moulds(moulds)
+        solved = None
+        if (Path(directory) / "design.toml").exists():
+            there = read_design_folder(directory)
+            same = there.design.manipulator == self.manipulator and there.design.shares == self.content.shares
+            solved = there.solve if same else None
+        return write_pack(self.content, directory, self.law, moulds, solved)
 
     def solve(
         self,

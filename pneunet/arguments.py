@@ -160,6 +160,12 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     add_output(a, "the design's folder")
 
+    a = add("export", "everything to cast it: STEP and STL of body and moulds, a sheet for the workshop")
+    a("design", type=path)
+    text = "printer, draft, clearances, ...; default: a bed of 220 mm and straight walls"
+    a("--moulds", type=path, metavar="MOULDS.toml", help=text)
+    add_output(a, "the design's folder; the pack is in its folder workshop")
+
     text = "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml"
     a = add("solve", text)
     a("design", type=path)

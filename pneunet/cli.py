@@ -48,6 +48,12 @@ def mesh(a: Namespace) -> None:
     mesh_design(a.design, a.output or a.design.parent, a.mesh_size_mm)
 
 
+def export(a: Namespace) -> None:
+    from pneunet.front import read_design
+
+    read_design(a.design).export(a.output or a.design.parent, a.moulds)
+
+
 def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
@@ -142,6 +148,7 @@ COMMANDS = {
     "shape": shape,
     "workspace": workspace,
     "mesh": mesh,
+    "export": export,
     "solve": solve,
     "cell": cell,
     "study": study,

@@ -25,8 +25,12 @@ from pneunet.geometry.sections import core_section, whole_section
 
 #: chords of a quarter of a rounded edge
 CHORDS = 4
-#: mm: dowels in either part; from a cut to the next upright dowel
-DEPTH, BESIDE_A_CUT = 5.0, 14.0
+#: mm: dowels in trays; from a cut to the next upright dowel
+DEPTH, BESIDE_A_CUT = 5.0, 16.0
+#: mm: least material around a dowel
+COVER = 0.8
+#: of the silicone's width that a vent may take
+VENT_SHARE = 0.7
 #: hole over tube
 TIGHT = 0.9
 OVER = np.diag([1.0, -1.0, -1.0, 1.0])  # half a turn about x
@@ -76,7 +80,7 @@ def solid(build: Callable[[], int], shift: np.ndarray, over: bool, step: Path | 
             write_model(step)
         gmsh.option.setNumber("Mesh.MeshSizeMax", 1e4)
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 16)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 12)
         gmsh.model.mesh.generate(2)
         return _triangles(tag)
 
@@ -146,16 +150,11 @@ def outside(run: Run, plane: float, moulds: Moulds) -> list[tuple[int, int]]:
         tags.append(cad.box(p.start, p.stop, s.width / 2, z0, p.core[1]))
         for x in p.positions if 1 in p.sides else ():
             low, high = (
-                cad.slanted_plan(x, s.chamber_thickness + 2 * grown, s.width / 2, s, _slant(p))
+                cad.slanted_plan(x, s.chamber_thickness + 2 * grown, s.width / 2, s, 1)
                 for grown in (moulds.slope * (s.chamber_top - z0), 0.0)
             )
             tags.append(frustum(low, high, z0, s.chamber_top))
     return cad.fuse(tags, unify=True)
-
-
-def _slant(placed, up=True):
-    """The side by whose slant a chamber that points up (or down) here is turned."""
-    return 1 if up else -1
 
 
 def void(run: Run, plane: float, top: float, below: float, moulds: Moulds) -> list[int]:
@@ -197,19 +196,21 @@ def _tray(piece: _Piece, plane: float, top: float) -> int:
     m = piece.moulds
     tag = piece.block(plane, top + m.floor)
     tools = outside(piece.run, plane, m)
-    tools += [
-        _cylinder(x, y, plane - 1, (0, 0, DEPTH + 1), m.dowel + m.clearance) for x, y in piece.dowels()
-    ]
+    tools += [_cylinder(x, y, plane - 1, (0, 0, DEPTH + 1), m.dowel + m.clearance) for x, y in piece.dowels()]
     return _without(tag, tools + _joints(piece, plane, top + m.floor))
 
 
 def _joints(piece, z0, z1):
     """Holes for dowels along x in the faces at which a mould is cut."""
     m, z = piece.moulds, (z0 + z1) / 2
-    faces = [(x, d) for x, d, there in ((piece.start, 1, piece.ends[0]), (piece.stop, -1, piece.ends[1])) if there]
-    y = piece.half - m.flange / 2
+    if z1 - z0 < m.dowel + 2 * COVER:  # tape holds such a thin one together
+        return []
+    faces = [
+        (x, d) for x, d, there in ((piece.start, 1, piece.ends[0]), (piece.stop, -1, piece.ends[1])) if there
+    ]
+    y, depth = piece.half - m.flange / 2, (m.plate + DEPTH) / 2
     return [
-        _cylinder(x - d, side * y, z, (d * (DEPTH + 1), 0, 0), m.dowel + m.clearance)
+        _cylinder(x - d, side * y, z, (d * (depth + 1), 0, 0), m.dowel + m.clearance)
         for x, d in faces
         for side in (-1, 1)
     ]
@@ -234,26 +235,27 @@ def _plate(piece: _Piece, plane: float) -> int:
         for x, y in piece.dowels()
     ]
     holes += [
-        _cylinder(x, y, plane - m.plate - 1, through, m.vent)
-        for x, y in vents(piece.run)
+        _cylinder(x, y, plane - m.plate - 1, through, diameter)
+        for x, y, diameter in vents(piece.run, m.vent)
         if piece.start + m.vent < x < piece.stop - m.vent
     ]
     return _without(tag, holes)
 
 
-def vents(run: Run) -> list[tuple[float, float]]:
-    """(x, y) where silicone and air leave through a plate: over the gaps, and at the run's ends."""
+def vents(run: Run, diameter: float) -> list[tuple[float, float, float]]:
+    """(x, y, diameter) where silicone and air leave through a plate: over the gaps, beside the channel, and
+    at both ends of every segment."""
     out = []
     for p in run.parts:
         s = p.segment
         y = (s.channel_width + s.width) / 4
         middles = (p.positions[1:] + p.positions[:-1]) / 2
         side = 1 if 1 in p.sides else -1 if p.sides else 0
-        out += [(x + side * s.cot * v, v) for x in middles for v in (-y, y)]
-        if len(middles) == 0:
-            out += [(p.start + s.end_length / 2, v) for v in (-y, y)]
-    first, last = run.parts[0], run.parts[-1]
-    out += [(p, 0.0) for p in (first.start + first.segment.end_wall / 2, last.stop - last.segment.end_wall / 2)]
+        room = [diameter, VENT_SHARE * (s.width - s.channel_width) / 2]
+        between = min(*room, VENT_SHARE * (2 * s.wall + s.gap) if p.sides else diameter)
+        out += [(x + side * s.cot * v, v, between) for x in middles for v in (-y, y)]
+        at_ends = min(*room, VENT_SHARE * 2 * s.end_margin)
+        out += [(x, v, at_ends) for x in (p.start + s.end_margin, p.stop - s.end_margin) for v in (-y, y)]
     return out
 
 
@@ -276,7 +278,12 @@ def _frame(piece: _Piece, low: float, high: float) -> int:
 
 
 def _trough(
-    rooms: np.ndarray, piece: _Piece, top: float, ports: list[tuple[float, int]], half: float, clearance: float
+    rooms: np.ndarray,
+    piece: _Piece,
+    top: float,
+    ports: list[tuple[float, int]],
+    half: float,
+    clearance: float,
 ) -> int:
     """A jig: rooms (n, 5) of x0, x1, y0, y1, lowest z, open at `top`; guides for the ports' tubes."""
     m, low = piece.moulds, rooms[:, 4].min() - piece.moulds.floor
@@ -314,7 +321,9 @@ def _hole(segment, moulds):
     return hole - 0.01 if (np.abs(hole - near) < 0.005).any() else hole
 
 
-def body_part(manipulator: Manipulator, moulds: Moulds, folder: Path | None = None, ports: bool = True) -> Part:
+def body_part(
+    manipulator: Manipulator, moulds: Moulds, folder: Path | None = None, ports: bool = True
+) -> Part:
     """The body itself, in its own axes and size."""
     step = folder / "body.step" if folder else None
     surface = solid(lambda: body_solid(manipulator, moulds, ports), np.zeros(3), False, step)
@@ -326,18 +335,21 @@ def mould_parts(manipulator: Manipulator, moulds: Moulds, folder: Path | None = 
     one is larger than the bed, or a parameter does not go with the body."""
     large = printed(manipulator, moulds)
     split = None if moulds.split is None else moulds.split / (1 - moulds.shrinkage)
-    found = runs(large, split)
+    found, needed = runs(large, split), 0
     for number, run in enumerate(found, start=1):
         cuts = run.cuts(moulds)
         pieces = [_Piece(run, a, b, moulds) for a, b in zip(cuts, cuts[1:])]
         turned = [_Piece(run.turned, a, b, moulds) for a, b in zip(cuts, cuts[1:])]
         to_body = _turn(run.turn)
+        closed = 1 if run.same_turned else 2  # trays with a plate
+        needed += closed * sum(len(piece.dowels()) for piece in pieces) + 2 * (closed + 2) * (len(pieces) - 1)
         for i, (piece, flipped) in enumerate(zip(pieces, turned), start=1):
             here = f"run{number}" * (len(found) > 1) + "-" * (len(found) > 1)
             which = f"-{i}" * (len(pieces) > 1)
-            twice = 1 + run.same_turned
 
-            def make(kind, does, build, size, z0, over, frame, silicone, count=1, a=piece.start, half=piece.half):
+            def make(
+                kind, does, build, size, z0, over, frame, silicone, count=1, a=piece.start, half=piece.half
+            ):
                 """z0: of the run's frame, where the part's lowest point comes from."""
                 name = f"{here}{kind}{which}"
                 _refuse_larger(name, size, moulds)
@@ -349,7 +361,10 @@ def mould_parts(manipulator: Manipulator, moulds: Moulds, folder: Path | None = 
                 place = frame @ (OVER @ back if over else back)
                 if silicone is not None:
                     low, high = silicone
-                    box = np.array([[*low, 1.0], [*high, 1.0]]) @ (np.linalg.inv(OVER @ back if over else back)).T
+                    box = (
+                        np.array([[*low, 1.0], [*high, 1.0]])
+                        @ (np.linalg.inv(OVER @ back if over else back)).T
+                    )
                     silicone = np.sort(box[:, :3], axis=0)
                 return Part(name, does, *surface, count, place, silicone)
 
@@ -393,10 +408,10 @@ def mould_parts(manipulator: Manipulator, moulds: Moulds, folder: Path | None = 
                     to_body,
                     ((x0, -run.half_width, low), (x1, run.half_width, high)),
                 )
-            yield _jig(make, run, piece, to_body, twice)
+            yield _jig(make, run, piece, to_body)
     if len(found) > 1:
         yield from _assembly(large, moulds, folder)
-    yield _pin(moulds, folder)
+    yield _pin(moulds, folder, needed)
 
 
 def _turn(degrees):
@@ -417,7 +432,7 @@ def _refuse_larger(name, size, moulds):
             )
 
 
-def _jig(make, run, piece, to_body, twice):
+def _jig(make, run, piece, to_body):
     c = piece.moulds.clearance
     ends = {run.start: -c, run.stop: c}
     rooms = np.array(
@@ -468,16 +483,14 @@ def _assembly(large, moulds, folder):
         _refuse_larger(name, (b - a, 2 * half, top - low), moulds)
         shift = np.array([-a, half, -low])
         step = folder / f"{name}.step" if folder else None
-        surface = solid(
-            lambda piece=piece: _trough(rooms, piece, top, [], half, c), shift, False, step
-        )
+        surface = solid(lambda piece=piece: _trough(rooms, piece, top, [], half, c), shift, False, step)
         place = np.eye(4)
         place[:3, 3] = -shift
         yield Part(name, "holds the cast runs while they are joined end to end", *surface, place=place)
 
 
-def _pin(moulds, folder):
-    size = 2 * DEPTH - 1
+def _pin(moulds, folder, count):
+    size = moulds.plate + DEPTH - 0.5
     step = folder / "dowel.step" if folder else None
     surface = solid(lambda: _cylinder(0, 0, 0, (0, 0, size), moulds.dowel)[1], np.zeros(3), False, step)
-    return Part("dowel", "aligns trays and plates, or take steel pins", *surface, count=8)
+    return Part("dowel", "aligns trays and plates, or take steel pins", *surface, count=count)

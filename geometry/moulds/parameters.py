@@ -25,7 +25,10 @@ class Moulds(Checked):
     clearance: float = quantity("mm", 0.15, "dowels in holes, body in the jig", low=0, high=1)
     fillet: float = quantity("mm", 0.0, "radius of the upright edges of the chambers' cores", low=0, high=5)
     split: float | None = quantity(
-        "mm", None, "height of the split plane above the channel's axis; default: the cavities' floor", low=-50
+        "mm",
+        None,
+        "height of the split plane above the channel's axis; default: the cavities' floor",
+        low=-50,
     )
     shrinkage: float = quantity("percent", 0.001, "of the silicone as it cures, linear", low=-1, high=5)
     flange: float = quantity("mm", 8.0, "walls of the moulds; dowels go through them", low=5, high=50)
@@ -34,7 +37,9 @@ class Moulds(Checked):
     dowel: float = quantity("mm", 3.0, "diameter", low=1, high=10)
     vent: float = quantity("mm", 1.5, "diameter of the holes in the plates", low=0.5, high=5)
     port: float = quantity("mm", 2.0, "outer diameter of the tube", low=0.5, high=10)
-    waste: float = quantity("percent", 0.2, "mixed beyond the body's volume: cup, vents, rim", low=0, high=200)
+    waste: float = quantity(
+        "percent", 0.2, "mixed beyond the body's volume: cup, vents, rim", low=0, high=200
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -73,7 +78,10 @@ def _check(where: str, s: Segment, moulds: Moulds) -> None:
             f"port_mm = {moulds.port:g}: larger than the channel of {where}, {s.channel_height:g} mm high"
         )
     grown = moulds.slope * (s.chamber_top + s.channel_height / 2)
-    fin, tip = s.gap - 2 * grown, s.cavity_thickness - 2 * moulds.slope * (s.cavity_top + s.channel_height / 2)
+    fin, tip = (
+        s.gap - 2 * grown,
+        s.cavity_thickness - 2 * moulds.slope * (s.cavity_top + s.channel_height / 2),
+    )
     if moulds.draft and (min(fin, tip) < THINNEST_FIN or grown / s.sin > s.end_margin):
         raise InputError(
             f"draft_deg = {moulds.draft:g}: fins and cores of {where} would be thinner than {THINNEST_FIN:g}"

@@ -53,7 +53,9 @@ class Part:
         surface is not closed, not manifold, inside out or undercut."""
         facts: dict[str, float] = {"open_edges": open_edges(self.triangles), "volume_mm3": self.volume}
         if facts["open_edges"] or not facts["volume_mm3"] > 0:
-            raise InputError(f"{self.name}: its surface is not closed: walls of the body touch or cut each other")
+            raise InputError(
+                f"{self.name}: its surface is not closed: walls of the body touch or cut each other"
+            )
         try:
             import trimesh
 
@@ -77,7 +79,9 @@ def as_manifold(points: np.ndarray, triangles: np.ndarray, name: str = "surface"
     mesh = manifold3d.Mesh64(np.ascontiguousarray(points, float), np.ascontiguousarray(triangles, np.uint64))
     found = manifold3d.Manifold(mesh)
     if found.status() != manifold3d.Error.NoError or found.is_empty():
-        raise InputError(f"{name}: is not manifold ({found.status()}): walls of the body touch or cut each other")
+        raise InputError(
+            f"{name}: is not manifold ({found.status()}): walls of the body touch or cut each other"
+        )
     return found
 
 
