@@ -18,6 +18,7 @@ from benchmarks import (
     contact,
     contact_page,
     door,
+    doubt,
     house,
     kills,
     law,
@@ -31,6 +32,7 @@ from benchmarks import (
     silicones,
     speed,
     verification,
+    workspace,
 )
 from benchmarks.tables import table
 from pneunet.base.files.atomic import write_text
@@ -75,6 +77,11 @@ PARTS = {
             " some seconds"
         ),
     ),
+    "doubt": (
+        doubt.doubt,
+        "the law's doubt: cost, agreement with the exact deviation; `pneunet shape` of the demo; a minute",
+    ),
+    "workspace": (workspace.hundred_thousand, "100,000 shapes of one to three segments; some seconds"),
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",

@@ -32,3 +32,10 @@ def hexahedron_volumes(corners: np.ndarray) -> np.ndarray:
     """(n,) mm3, exact for the trilinear map, of corners (n, 8, 3)."""
     places, weights = gauss(2)
     return jacobians(corners, places) @ weights
+
+
+def scaled_determinants(corners: np.ndarray) -> np.ndarray:
+    """(n, 8) determinants at the corners of hexahedra (n, 8, 3) over the lengths of the edges that meet
+    there."""
+    edges = np.einsum("qca,nci->nqai", shape_slopes(CORNERS.astype(float)), corners)
+    return np.linalg.det(edges) / np.prod(np.linalg.norm(edges, axis=-1), axis=-1)

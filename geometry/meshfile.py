@@ -10,7 +10,7 @@ import numpy as np
 from pneunet.base.errors import InputError, located
 from pneunet.base.files.archive import Member, read_archive, write_archive
 from pneunet.geometry import tags
-from pneunet.geometry.hexahedra import CORNERS, gauss, hexahedron_volumes, jacobians
+from pneunet.geometry.hexahedra import CORNERS, gauss, hexahedron_volumes, jacobians, scaled_determinants
 
 #: file of a manipulator's mesh
 MESH = "manipulator.npz"
@@ -30,7 +30,7 @@ def _members(about, names):
         "cells": Member("i", ("cells", of_cell), 0, "points"),
         "cell_tags": Member("i", ("cells",), tags.BODY, tags.GAP + 1),
         "facets": Member("i", ("facets", of_facet), 0, "points"),
-        "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.OUTER + 1),
+        "facet_tags": Member("i", ("facets",), tags.CAVITY, tags.LAST_FACE + 1),
     }
 
 
@@ -39,8 +39,8 @@ class VolumeMesh:
     """points (n, 3) in mm; cells (m, 4) or (m, 8) and tagged facets (k, 3) or (k, 4) as numbers of points,
     with their tags (m,) and (k,) of geometry.tags.
 
-    Corners of a hexahedron go round its bottom, then round its top (gmsh, VTK). InputError where a cell has no
-    positive volume, a hexahedron not everywhere.
+    Corners of a hexahedron go round its bottom, then round its top (gmsh, VTK). InputError where a cell has
+    no positive volume, a hexahedron not everywhere.
     """
 
     points: np.ndarray
@@ -74,6 +74,19 @@ class VolumeMesh:
             return jacobians(self.points[self.cells], places).min(axis=1)
         return self.volumes()
 
+    def qualities(self) -> np.ndarray:
+        """(m,) 1 for regular cells: mean ratios of tetrahedra, scaled determinants of hexahedra, the smallest
+        of their corners."""
+        corners = self.points[self.cells]
+        if self.element == "hexahedra":
+            return scaled_determinants(corners).min(axis=1)
+        return volumes_and_quality(corners)[1]
+
+    def areas(self, tag: int) -> np.ndarray:
+        """(n,) mm2 of the facets with this tag, their corners taken to lie in a plane."""
+        corners = self.points[self.tagged(tag)]
+        return np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1), axis=1) / 2
+
     def tagged(self, tag: int) -> np.ndarray:
         """Facets (n, 3) or (n, 4) with this tag."""
         return self.facets[self.facet_tags == tag]
@@ -93,7 +106,7 @@ def read_mesh(path: str | Path) -> tuple[VolumeMesh, dict[str, Any]]:
                 for name, values in stored.items()
             }
         )
-    return mesh, {name: value for name, value in facts.items() if name not in ("schema", "element")}
+    return mesh, {name: value for name, value in facts.items() if name != "schema"}
 
 
 def volumes_and_quality(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

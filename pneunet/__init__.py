@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from pneunet.design.design import Design as Design
     from pneunet.design.inverse_design import inverse_design as inverse_design
     from pneunet.design.report.rundata import Solution as Solution
+    from pneunet.design.target.casting import Casting as Casting
+    from pneunet.design.target.shapes import TargetShape as TargetShape
+    from pneunet.design.target.shapes import TipPoints as TipPoints
     from pneunet.design.target.target import Target as Target
     from pneunet.design.workspace import Workspace as Workspace
     from pneunet.design.workspace import workspace as workspace
@@ -48,6 +51,7 @@ if TYPE_CHECKING:
 
 #: public name -> module that has it
 _PLACES = {
+    "Casting": "design.target.casting",
     "Centreline": "reduced.rod.centreline",
     "ConvergenceError": "base.errors",
     "Curve": "base.curve",
@@ -62,6 +66,8 @@ _PLACES = {
     "Segment": "geometry.parameters",
     "Solution": "design.report.rundata",
     "Target": "design.target.target",
+    "TargetShape": "design.target.shapes",
+    "TipPoints": "design.target.shapes",
     "Workspace": "design.workspace",
     "inverse_design": "design.inverse_design",
     "loads": "front",

@@ -6,6 +6,7 @@ anything else is a bug and shows its traceback.
 """
 
 import errno
+import logging
 import os
 import sys
 from argparse import Namespace
@@ -22,6 +23,7 @@ from pneunet.base.units import MPA_PER_KPA
 
 #: exit code of a design that is written, but does not follow its target
 NOT_FOLLOWED = 3
+log = logging.getLogger(__name__)
 
 
 def design(a: Namespace) -> int:
@@ -50,6 +52,7 @@ def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
     content = read_design_file(a.design)  # before finite elements are loaded, which takes a while
+    log.info(f"solve: {content.name}; finite elements are loaded")
     from pneunet.hifi.runs.solve.solve import solve_design
 
     pressure = None if a.pressure is None else a.pressure * MPA_PER_KPA
@@ -58,18 +61,21 @@ def solve(a: Namespace) -> None:
 
 
 def cell(a: Namespace) -> None:
+    log.info(f"cell: {a.cell}; finite elements are loaded")
     from pneunet.hifi.runs.cell import run_cell
 
     run_cell(a.cell, a.output or a.cell.parent)
 
 
 def study(a: Namespace) -> None:
+    log.info(f"study: {a.study}; finite elements are loaded")
     from pneunet.hifi.runs.study.study import run_study
 
     run_study(a.study, a.output or Path("out") / a.study.stem, retry=a.retry)
 
 
 def campaign(a: Namespace) -> None:
+    log.info(f"campaign: {a.campaign}; finite elements are loaded")
     from pneunet.hifi.runs.campaign.campaign import run_campaign
 
     run_campaign(a.campaign, a.output or Path("out") / a.campaign.stem, retry=a.retry, extend=a.extend)

@@ -11,6 +11,7 @@ from pneunet.base.materials.laws import Hyperelastic, material_from_table
 from pneunet.base.units import each_in_MPa
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.report import write_report
+from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import Manipulator, Segment
@@ -60,9 +61,12 @@ def predict(
 
     pressure_kPa: one for all, or one for each group of segments. law: 'trained', 'analytic', a law's file
     (.npz) or a SegmentLaw. InputError where a pressure or their number is wrong, ConvergenceError where the
-    law has no equilibrium.
+    law has no equilibrium. What makes the law doubt its answer is logged.
     """
-    return prediction.predict(manipulator, each_in_MPa(pressure_kPa), chosen_law(law), base_pose=base_pose)
+    law, pressure = chosen_law(law), each_in_MPa(pressure_kPa)
+    line = prediction.predict(manipulator, pressure, law, base_pose=base_pose)
+    tell_doubts(prediction.doubts(manipulator, [pressure], law), law, WARN)
+    return line
 
 
 def rod(

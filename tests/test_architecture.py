@@ -24,7 +24,7 @@ FLOORS = {
 #: what lies in the package itself
 ROOMS = {
     "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
-    "geometry": [{""}, {"cad"}],
+    "geometry": [{""}, {"grids"}, {"cad"}],
     "hifi": [
         {"fem"},
         {"path"},

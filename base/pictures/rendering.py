@@ -165,15 +165,19 @@ def show(ax: Any, view: View, image: np.ndarray, overlays: Sequence[Overlay] = (
     ax.imshow(image)
     ax.set_axis_off()
     for points, style in overlays:
-        ax.plot(*view.pixels(points).T, **style, path_effects=[withStroke(linewidth=5, foreground="white")])
+        ax.plot(*view.pixels(points).T, **style, path_effects=[withStroke(linewidth=4.5, foreground="white")])
     _scale_bar(ax, view)
     _triad(ax, view)
 
 
-def _scale_bar(ax, view):
-    wanted = 0.2 * PIXELS[0] * view.millimetres_per_pixel
+def round_length(wanted: float) -> float:
+    """1, 2 or 5 times a power of ten, at most what is wanted."""
     decade = 10 ** np.floor(np.log10(wanted))
-    length = decade * max(n for n in (1, 2, 5) if n * decade <= wanted)
+    return float(decade * max(n for n in (1, 2, 5) if n * decade <= wanted))
+
+
+def _scale_bar(ax, view):
+    length = round_length(0.2 * PIXELS[0] * view.millimetres_per_pixel)
     pixels = length / view.millimetres_per_pixel
     x, y = PIXELS[0] - 30, PIXELS[1] - 22
     ax.plot([x - pixels, x], [y, y], color="black", linewidth=2.2, solid_capstyle="butt")

@@ -16,7 +16,7 @@ from pneunet.base.files.text import read_text
 from pneunet.base.pictures.rendering import View, edges, view_of
 from pneunet.base.pictures.walls import FIELD
 from pneunet.design.report.comparison import Comparison
-from pneunet.design.report.labels import TARGET, segment_colour
+from pneunet.design.report.labels import TARGET, rgb, segment_colour
 from pneunet.design.report.rundata import DesignFolder
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.rod.laws import SegmentLaw
@@ -51,12 +51,10 @@ def body_mesh(
 
 def painted(mesh: "PolyData") -> list[tuple["PolyData", dict]]:
     """A body in the colours of its segments, with its sharp edges, as things to render."""
-    from matplotlib.colors import to_rgb
-
     mesh = mesh.copy()
     segments = np.asarray(mesh.cell_data["segment"]) - 1
-    colours = np.array([to_rgb(segment_colour(i)) for i in range(segments.max() + 1)])
-    mesh.cell_data["colour"] = (255 * colours[segments]).astype(np.uint8)
+    colours = np.array([rgb(segment_colour(i)) for i in range(segments.max() + 1)], np.uint8)
+    mesh.cell_data["colour"] = colours[segments]
     return [(mesh, {"scalars": "colour", "rgb": True, "preference": "cell"}), edges(mesh)]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from pneunet.base.errors import ConvergenceError
 from pneunet.base.pictures import rendering
 from pneunet.base.pictures.rendering import figure, save
-from pneunet.base.pictures.walls import TOUCHING, draw_walls
+from pneunet.base.pictures.walls import EVENLY_LIT, TOUCHING, draw_walls
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.design.report import bodies
 from pneunet.design.report.bodies import Scene
@@ -28,8 +28,8 @@ FIELDS = (
     ("fe_displacement.png", "displacement length", "displacement", " mm", 100),
     ("fe_stretch.png", MEAN_STRETCH, "mean principal stretch", "", 98),
 )
-#: dark to light in even steps, no end of it pale
-MAP = "plasma"
+#: tells most values apart, where most of a body is stretched little
+MAP = "turbo"
 
 
 def _at(design, solve):
@@ -66,7 +66,7 @@ def body_pictures(run: DesignFolder, scene: Scene, folder: Path) -> list[tuple[s
     body; the reference body."""
     solve = run.solve
     pressure = run.design.pressure if solve is None else run.design.scaled(solve.pressure)
-    dashed = [] if run.target is None else [(run.target, STYLES["target"])]
+    dashed = [] if run.target is None else [(run.target, STYLES["target"] | {"linewidth": 3.0})]
     with_target = "; dashed in front: the target" * bool(dashed)
     out = []
 
@@ -107,9 +107,10 @@ def body_pictures(run: DesignFolder, scene: Scene, folder: Path) -> list[tuple[s
             if field == MEAN_STRETCH:
                 inside = significant(solve.steps["largest_stretch"][-1], 3)
                 caption += f". Inside an element it is at most {inside} (largest_stretch in steps.csv)"
+            coloured, look = rendering.coloured(surface, field, limits, MAP)
             picture(
                 name,
-                [rendering.coloured(surface, field, limits, MAP), lines],
+                [(coloured, look | EVENLY_LIT), lines],
                 f"{what}, {_at(run.design, solve)}",
                 f"{caption}.",
                 bar=(f"{what} ({unit.strip() or '-'})", limits, MAP),
@@ -283,7 +284,8 @@ def wall_picture(manipulator: Manipulator, solve: Solution, folder: Path) -> lis
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
         ax.set_title(
-            "upper chambers" if side > 0 else "lower chambers (seen through the body)",
+            ("upper chambers" if side > 0 else "lower chambers (seen through the body)")
+            + ", each segment as before its roll" * any(s.roll for s in manipulator.segments),
             fontsize=9,
             loc="left",
             pad=7,

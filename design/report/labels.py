@@ -18,6 +18,12 @@ def segment_colour(index: int) -> str:
     return SEGMENT_COLOURS[index % len(SEGMENT_COLOURS)]
 
 
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue from 0 to 255 of '#rrggbb'."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
+
+
 def plain(value: float, decimals: int = 2) -> str:
     """A number without trailing zeros: 2 -> '2', 5.7735 -> '5.77'."""
     text = f"{value:.{decimals}f}"

@@ -52,7 +52,7 @@ th { background: #f1f3f5; }
 th:first-child, td:first-child { text-align: left; }
 tr.head td { font-weight: 600; background: #f8f9fa; }
 td.long { white-space: normal; text-align: left; word-break: break-word; }
-.grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: .8rem; }
+.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(290px, 1fr)); gap: .8rem; }
 figure { margin: .8rem 0; }
 .grid figure { margin: 0; }
 img { width: 100%; height: auto; border: 1px solid #e4e8ec; }
@@ -84,21 +84,22 @@ def write_report(directory: str | Path, law: SegmentLaw | None = None) -> Path:
 
 def _write(run, law, folder):
     """The path of the page."""
+    log.info(f"report of {run.directory}: curves and bodies")
     comparison = Comparison.of(run, law)
     scene = Scene.of(run, comparison, law)
     draw_drawing(run.design, folder / "drawing.png")
-    sections = [
-        ("Target, prediction, finite elements", _shapes(run, comparison, scene, folder)),
-        ("Errors", _errors(comparison, run)),
-        ("Strains of the segments", _strains(run, comparison)),
-        ("Load history", _history(run, law, folder)),
-        ("Where walls touch", _walls(run, scene, folder)),
-        ("Drawing, dimensions, material", _drawing(run, folder)),
-        ("How it was computed", _computed(run)),
-    ]
-    body = _headline(run, comparison) + "".join(
-        f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections
-    )
+    body = _headline(run, comparison)
+    for title, content in (
+        ("Target, prediction, finite elements", lambda: _shapes(run, comparison, scene, folder)),
+        ("Errors", lambda: _errors(comparison, run)),
+        ("Strains of the segments", lambda: _strains(run, comparison)),
+        ("Load history", lambda: _history(run, law, folder)),
+        ("Where walls touch", lambda: _walls(run, scene, folder)),
+        ("Drawing, dimensions, material", lambda: _drawing(run, folder)),
+        ("How it was computed", lambda: _computed(run)),
+    ):
+        log.info(f"  {title.lower()}")
+        body += f"<section><h2>{escape(title)}</h2>{content()}</section>"
     page = (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -186,8 +187,9 @@ def _headline(run, comparison):
     out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
     if c.reduced_solved:
         out += (
-            f'<p class="missing">The bars are conventions of this report: an RMS distance of {POSITION_BAR:g} %'
-            f" of length, a difference of {STRAIN_BAR:g} % of the largest |k| of a segment.</p>"
+            '<p class="missing">The bars are conventions of this report: an RMS distance of'
+            f" {POSITION_BAR:g} % of length, a difference of {STRAIN_BAR:g} % of the largest |k| of a"
+            " segment.</p>"
         )
     return out
 

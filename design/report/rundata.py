@@ -133,6 +133,7 @@ def read_design_folder(directory: str | Path) -> "DesignFolder":
     walls = whole(_walls, "solve/walls.csv", design, instead=[])
     solve = whole(_solve, "solve", design, walls, record)
     ours = {"body": body_tables(design.manipulator), "loads": design.loads.table()}
+    ours["pressure_shares"] = list(design.shares)
     stale = solve is not None and any(record.get(name, value) != value for name, value in ours.items())
     return DesignFolder(
         directory,

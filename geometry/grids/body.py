@@ -15,14 +15,15 @@ import numpy as np
 from pneunet.geometry import tags
 from pneunet.geometry.grids.cell import contents
 from pneunet.geometry.grids.planes import SNAP, Planes, along, lean, sideways, snapped, upright
-from pneunet.geometry.grids.tensor import CHANNEL_AIR, TensorGrid
+from pneunet.geometry.grids.tensor import AIR_OF_GROUP, CHANNEL_AIR, EMPTY, TensorGrid
 from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.sections import rotation
 
 
 def body_grid(manipulator: Manipulator, size: float) -> TensorGrid:
     """The body, elements in its active parts at most `size` mm along x, y and z."""
     segments = [snapped(s) for s in manipulator.segments]
-    closed = [True, *[False] * (len(segments) - 1), True]
+    closed = [True, *(a.group != b.group for a, b in zip(segments, segments[1:])), True]
     parts = [
         _Part(
             tags.BODY + i,
@@ -130,7 +131,7 @@ class _Section:
             _Axis(upright(s, size), [s.core_bottom, -s.channel_height / 2, s.channel_height / 2, s.core_top]),
         )
         self._axes = []
-        for row in np.rint(_turn(s)).astype(int):
+        for row in np.rint(rotation(s)[1:, 1:]).astype(int):
             axis = own[np.flatnonzero(row)[0]]
             self._axes.append(axis if row.sum() > 0 else axis.reversed)
         self.counts = np.array([axis.counts(size) for axis in self._axes])
@@ -145,14 +146,7 @@ class _Section:
 
     def _own(self, levels):
         """(2, ny, nz): the crossings of planes across the body's y and z, in the segment's own axes."""
-        return np.einsum(
-            "ji,jab->iab", _turn(self.segment), np.meshgrid(*levels, indexing="ij")
-        )
-
-
-def _turn(segment):
-    """(2, 2): y and z of the segment's own axes in the body's."""
-    return np.eye(2)
+        return np.einsum("ji,jab->iab", rotation(self.segment)[1:, 1:], np.meshgrid(*levels, indexing="ij"))
 
 
 @dataclass(frozen=True)
@@ -205,6 +199,7 @@ class _Part:
         middles = [(d[1:] + d[:-1]) / 2 for d in distances]
         solid = np.logical_or(*(m < end.solid for m, end in zip(middles, self.ends)))
         kinds[solid[:, None, None] & (kinds == CHANNEL_AIR)] = self.tag
+        kinds[(kinds > EMPTY) & (kinds < tags.BODY)] += AIR_OF_GROUP * (s.group - 1)
         return points, kinds
 
     def _joint(self, other, axis, own_end, other_end):

@@ -11,6 +11,7 @@ from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 #: kind -> diagonals of the half turns, about axes through a chamber's middle, that take a cell to itself
 HALF_TURNS = {ONE_SIDED: ((-1, -1, 1),), TWISTING: ((-1, -1, 1), (1, -1, -1), (-1, 1, -1))}
 
+
 def cell_grid(
     segment: Segment, size: float, layer: float | None = None, gaps: bool = False, part: bool = False
 ) -> TensorGrid:
@@ -53,11 +54,12 @@ def contents(
     s = segment
     side = np.where(z < 0, -1, 1) if s.kind == TWISTING else 1
     height = side * z
-    in_core = (s.core_bottom < z) & (z < s.core_top) & (np.abs(y) < s.width / 2)
+    within = np.abs(y) < s.width / 2
+    in_core = within & (s.core_bottom < z) & (z < s.core_top)
     channel = (np.abs(y) < s.channel_width / 2) & (np.abs(z) < s.channel_height / 2)
     kinds = np.where(in_core, np.where(z < s.layer_top, layer, body), EMPTY) + 0 * np.zeros_like(xi, int)
     if s.sides:
-        above = (s.core_top < height) & (height < s.chamber_top)
+        above = within & (s.core_top < height) & (height < s.chamber_top)
         wall = np.abs(xi) < s.chamber_thickness / 2 / s.sin
         kinds = np.where(above & wall, body, np.where(above & ~wall & gaps, tags.GAP, kinds))
         cavity = (np.abs(xi) < s.cavity_thickness / 2 / s.sin) & (np.abs(y) < s.cavity_width / 2)

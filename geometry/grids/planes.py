@@ -120,9 +120,7 @@ def _divided(a, b, size, layer, low, high):
 def along(segment: Segment) -> Planes:
     """Planes across xi of half a pitch, from a chamber's middle to that of the gap."""
     s = segment
-    return Planes.of(
-        [s.cavity_thickness / 2 / s.sin, s.chamber_thickness / 2 / s.sin], [0.0, s.pitch / 2]
-    )
+    return Planes.of([s.cavity_thickness / 2 / s.sin, s.chamber_thickness / 2 / s.sin], [0.0, s.pitch / 2])
 
 
 def sideways(segment: Segment, middle: bool = False) -> Planes:

@@ -1,9 +1,11 @@
 """Segments and manipulators at random that could be cast: what every grid must be made of."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.geometry.parameters import KINDS, ONE_SIDED, Manipulator, Segment
+from pneunet.geometry.parameters import KINDS, ONE_SIDED, ROLLS, Manipulator, Segment
 
 
 def random_segment(random: np.random.Generator) -> Segment:
@@ -42,9 +44,16 @@ def random_segment(random: np.random.Generator) -> Segment:
 
 
 def random_manipulator(random: np.random.Generator) -> Manipulator:
-    """Two to five random segments whose channels fit into their neighbours' cores."""
+    """Two to five random segments whose channels fit into their neighbours' cores, some of them rolled, some
+    passive, some with a cavity of their own."""
     while True:
-        segments = [random_segment(random) for _ in range(random.integers(2, 6))]
+        segments: list[Segment] = []
+        for _ in range(random.integers(2, 6)):
+            segment = random_segment(random)
+            if segments and random.random() < 0.2:
+                segment = segment.plain(segment.end_margin + float(random.uniform(0.5, 20.0)))
+            group = segments[-1].group + bool(random.random() < 0.2) if segments else 1
+            segments.append(replace(segment, roll=int(random.choice(ROLLS)), group=int(group)))
         try:
             return Manipulator(tuple(segments))
         except InputError:

@@ -8,8 +8,9 @@ from pneunet.geometry import tags
 from pneunet.geometry.hexahedra import CORNERS
 from pneunet.geometry.meshfile import VolumeMesh
 
-#: what a cell holds: nothing, the channel's air or that of a chamber; else a tag of geometry.tags
-EMPTY, CHANNEL_AIR, CAVITY_AIR = 0, 1, 2
+#: what a cell holds: nothing, the channel's air or that of a chamber, more by AIR_OF_GROUP for each further
+#: pressure group; else a tag of geometry.tags
+EMPTY, CHANNEL_AIR, CAVITY_AIR, AIR_OF_GROUP = 0, 1, 2, 2
 #: corners of the lower face across an axis, seen from above: x, y and z in the order that turns right
 _FACES = np.array(
     [
@@ -18,6 +19,22 @@ _FACES = np.array(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
     ]
 )
+
+
+def _faces_of():
+    """(kinds,) the tag of a solid's facet by the kind on its other side: across y and z, and across x, where
+    a channel ends and has no wall."""
+    beside = np.full(tags.GAP + 1, tags.OUTER)
+    across = beside.copy()
+    for group in range(1, tags.MOST_GROUPS + 1):
+        first = AIR_OF_GROUP * (group - 1)
+        chamber, channel = tags.cavity_tags(group)
+        beside[first + CHANNEL_AIR], beside[first + CAVITY_AIR] = channel, chamber
+        across[first + CHANNEL_AIR] = across[first + CAVITY_AIR] = chamber
+    return beside, across
+
+
+_BESIDE, _ACROSS = _faces_of()
 
 
 @dataclass(frozen=True)
@@ -34,8 +51,9 @@ class TensorGrid:
 
     def mesh(self, air: bool = False) -> VolumeMesh:
         """The solid and the gaps that are meshed, with its air or without."""
-        kept = (self.kinds > CAVITY_AIR) | (air & (self.kinds > EMPTY))
-        kinds = np.where(self.kinds > CAVITY_AIR, self.kinds, tags.AIR)
+        solid = self.kinds >= tags.BODY
+        kept = solid | (air & (self.kinds > EMPTY))
+        kinds = np.where(solid, self.kinds, tags.AIR)
         cells = self._numbers(np.argwhere(kept), CORNERS)
         facets, facet_tags = zip(*(self._facets(axis) for axis in range(3)))
         used, cells = np.unique(cells, return_inverse=True)
@@ -64,10 +82,7 @@ class TensorGrid:
         found, told = [], []
         for inside, other, turn in ((solid[0] & ~solid[1], high, 1), (solid[1] & ~solid[0], low, -1)):
             cells = np.argwhere(inside)
-            tag = np.choose(
-                np.minimum(other[inside], 3),
-                [tags.OUTER, tags.CHANNEL if axis else tags.CAVITY, tags.CAVITY, tags.OUTER],
-            )
+            tag = (_BESIDE if axis else _ACROSS)[other[inside]]
             at = cells[:, axis]
             for place, side in ((0, -1), (self.kinds.shape[axis], 1)):
                 end = self.ends.get((axis, side), tags.OUTER)

@@ -22,6 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pneunet.geometry import tags
+from pneunet.geometry.meshfile import read_mesh
 from pneunet.geometry.parameters import Segment
 from pneunet.hifi.cell.symmetry import Orbits, SymmetryClass, characters, group, windows
 from pneunet.hifi.contact.cell import CellContact
@@ -50,8 +51,8 @@ class CellProblem(MixedField):
     section frame; centre: X1 (mm) where that frame sits, in the middle of the pitch over which it is fitted.
     rollers: {facet tag: component of u that is zero}. contact: the hifi.contact.penalty.WallPenalty between
     the walls of the gaps. medium: or a hifi.contact.medium.ThirdMedium that fills the gaps, which must be
-    meshed then; without it, meshed gaps are void. part: the mesh is that part of the cell from which half
-    turns make the rest (geometry.grids.cell); states have this symmetry then.
+    meshed then; without it, meshed gaps are void. Where the mesh is a part of the cell from which half turns
+    make the rest (geometry.grids.cell), states have this symmetry.
     """
 
     def __init__(
@@ -63,14 +64,14 @@ class CellProblem(MixedField):
         rollers: dict[int, int] | None = None,
         medium: ThirdMedium | None = None,
         contact: WallPenalty | None = None,
-        part: bool = False,
     ):
+        part = not isinstance(mesh, tuple) and bool(read_mesh(mesh)[1].get("part"))
         if part and (contact or medium):
             raise ValueError("contact needs the whole cell")
         super().__init__(*(mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, MPI.COMM_SELF)))
         self.segment, self._gauge_of, self._penalty = segment, (gauge, centre), contact
         #: (g, 3) diagonals of the rotations that make the cell of the mesh
-        self.turns = group(segment.kind, part) if part else np.ones((1, 3))
+        self.turns = group(segment.kind if part else None)
         self.medium = medium.on(self.mesh) if medium else None
         self.strains = fem.Constant(self.mesh, PETSc.ScalarType(np.eye(6)[0]))
         self.pressure = fem.Constant(self.mesh, PETSc.ScalarType(0.0))

@@ -1,5 +1,6 @@
 """One pitch of a segment from rest to a pressure, free or at prescribed strains, with its rod stiffness."""
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.cad.grid import grid_cell
 from pneunet.hifi.cell.file import EDGE, CellCase
 from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.symmetry import characters, group, strains_of
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellState, CellSystem
 from pneunet.hifi.contact.medium import soften
 from pneunet.hifi.contact.touch import Load, TouchWatch
@@ -18,6 +21,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath, LimitPoint
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
 
+log = logging.getLogger(__name__)
 #: iterations that a lagged tangent may still need in contact, where tangents age fast
 CONTACT_PATIENCE = 10.0
 
@@ -36,13 +40,23 @@ def solve_cell(
     on_touch(pressure): told the pressure (MPa) of first touch, once, before the first state beyond it.
     ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
     """
-    edge_size = case.mesh_size * EDGE if case.graded else None
     medium = case.medium if case.contact == "third-medium" else None
-    facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=medium is not None, edge_size=edge_size)
+    facts = _mesh(case, mesh_path, gaps=medium is not None)
+    log.info(f"cell: {facts['cells']} elements; forms that are new to this machine are compiled")
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )
     return follow_path(case, problem, on_state, on_limit_point, on_touch), facts
+
+
+def _mesh(case, path, gaps):
+    """Facts of the mesh that the case asks for; a part of the cell where its states have half turns."""
+    edge = case.mesh_size * EDGE if case.graded else None
+    if case.element == "tetrahedra":
+        return mesh_cell(case.segment, case.mesh_size, path, gaps=gaps, edge_size=edge)
+    own = characters(group(case.segment.kind))[0], group(case.segment.kind)
+    part = case.contact == "none" and strains_of(*own)[list(case.held)].all()
+    return grid_cell(case.segment, case.mesh_size, path, edge, gaps, bool(part))
 
 
 def follow_path(

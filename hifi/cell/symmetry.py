@@ -1,11 +1,11 @@
-"""The unknowns of a cell: what periodicity and half turns leave of the nodes' values, one class of symmetry at a
-time.
+"""The unknowns of a cell: what periodicity and half turns leave of the nodes' values, in one class of
+symmetry at a time.
 
-Half turns R about the axes take the body to itself. Deformations fall into classes: in each, a half turn takes
-u(X) to chi R u(X) with a sign chi of its own, and the strains of one class do not move the others'. A free
-state is in the first class, where all signs are +1; the stiffness and the count of unstable directions are put
-together from all. With half turns only a part of the cell is meshed, and the signs hold on its cuts. Without
-them there is one class.
+Half turns R about the axes take the body to itself. Deformations fall into classes: in each, a half turn
+takes u(X) to chi R u(X) with a sign chi of its own, and the strains of one class do not move the others'. A
+free state is in the first class, where all signs are +1; the stiffness and the count of unstable directions
+are put together from all. With half turns only a part of the cell is meshed, and the signs hold on its cuts.
+Without them there is one class.
 """
 
 from collections.abc import Sequence
@@ -27,10 +27,10 @@ _SIDEWAYS[4, 2], _SIDEWAYS[5, 1] = -1, 1
 _TOLERANCE = 1e-5
 
 
-def group(kind: str, part: bool) -> np.ndarray:
-    """(g, 3) diagonals of the rotations that make a cell of its mesh: the identity, and the half turns of the
-    kind if the mesh is a `part` of it."""
-    return np.array([(1, 1, 1), *(HALF_TURNS[kind] if part else ())], float)
+def group(kind: str | None) -> np.ndarray:
+    """(g, 3) diagonals of the rotations that make a cell of its mesh: the identity, and the half turns of
+    this kind's parts."""
+    return np.array([(1, 1, 1), *(HALF_TURNS[kind] if kind else ())], float)
 
 
 def characters(turns: np.ndarray) -> np.ndarray:
@@ -38,6 +38,11 @@ def characters(turns: np.ndarray) -> np.ndarray:
     if len(turns) == 4:
         return np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]], float)
     return np.array([[1, 1], [1, -1]], float) if len(turns) == 2 else np.ones((1, 1))
+
+
+def strains_of(chi: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """(6,) bool: which of (e, k) belong to the class with the signs `chi` (g,) under the rotations (g, 3)."""
+    return (chi[:, None] == np.tile(turns[:, :1] * turns, 2)).all(axis=0)
 
 
 class Orbits:
@@ -133,7 +138,7 @@ class SymmetryClass:
         self.reduced = np.where(used, place[master], -1)
         self.unknowns = len(kept)
         self.constraints = int(np.count_nonzero(np.isin(kept, problem.pressure_dofs)))
-        self.strains = (chi[:, None] == np.tile(turns[:, :1] * turns, 2)).all(axis=0)
+        self.strains = strains_of(chi, turns)
         self._conditions = (chi[:, None] == np.tile(turns, 2)).all(axis=0)
         self._keep = self.reduced >= 0
 
@@ -177,7 +182,9 @@ class SymmetryClass:
         self.gauge, self.gauge_strains = gauge[:, self._conditions], strains[self._conditions]
         self._pattern: BorderedPattern | None = None
 
-    def bordered(self, matrix: Any, rows=(), columns=(), values=()) -> sp.csr_matrix:
+    def bordered(
+        self, matrix: Any, rows: Sequence = (), columns: Sequence = (), values: Sequence = ()
+    ) -> sp.csr_matrix:
         """The unknowns' matrix bordered by the gauge, of that of the mixed space and of entries of the
         unknowns."""
         if self._pattern is None:
@@ -186,7 +193,8 @@ class SymmetryClass:
 
 
 class BorderedPattern:
-    """Where the entries of a matrix of the mixed space go in that of a class's unknowns, bordered by the gauge.
+    """Where the entries of a matrix of the mixed space go in that of a class's unknowns, bordered by the
+    gauge.
 
     It grows by the entries of walls that touch, and keeps them when they part: a new pattern costs a new
     analysis.
@@ -219,7 +227,9 @@ class BorderedPattern:
         self._indices = (self._keys % self._size).astype(np.int32)
         self._indptr = np.searchsorted(self._keys, self._size * np.arange(self._size + 1)).astype(np.int32)
 
-    def filled(self, data, rows=(), columns=(), values=()):
+    def filled(
+        self, data: np.ndarray, rows: Sequence = (), columns: Sequence = (), values: Sequence = ()
+    ) -> sp.csr_matrix:
         """CSR matrix of the values `data` of the mixed space's matrix and of entries (row, column, value) of
         the unknowns.
 

@@ -169,8 +169,8 @@ class CellSystem:
         return gradient
 
     def factorise(self) -> None:
-        """Factorise the tangent. influence (unknowns and multipliers, 6): how unknowns and multipliers resist strains,
-        K^-1 d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
+        """Factorise the tangent. influence (unknowns and multipliers, 6): how these resist strains, K^-1
+        d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
         on."""
         matrix, mixed, self._curvature = self.problem.tangent()
         if self._pattern is not matrix.indices:
@@ -194,7 +194,9 @@ class CellSystem:
 
     def _gap_gradients(self, points):
         rows, n = self.problem.contact.gradients(points), self.problem.unknowns
-        return np.hstack([rows[:, :n], np.zeros((len(rows), self._inner - n)), rows[:, n:][:, self._free] / self.pitch])
+        return np.hstack(
+            [rows[:, :n], np.zeros((len(rows), self._inner - n)), rows[:, n:][:, self._free] / self.pitch]
+        )
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was
@@ -202,7 +204,7 @@ class CellSystem:
         return self._update.corrected(self._solve(right[:, None])[:, 0])
 
     def solve_inner(self, right: np.ndarray) -> np.ndarray:
-        """Inverse of the factorised tangent at held strains times right (unknowns and multipliers, columns)."""
+        """Inverse of the factorised tangent at held strains times right (unknowns and multipliers, n)."""
         return self._solver.solve_many(right)
 
     def _solve(self, right):
@@ -220,8 +222,8 @@ class CellSystem:
         """Unstable directions of the factorised state: each multiplier takes one negative pivot, strains
         count apart."""
         free = self.condensed[np.ix_(self._free, self._free)]
-        constraints = self.problem.classes[0].constraints + self._inner - self.problem.unknowns
-        inner = self._solver.negative_pivots - constraints
+        own = self.problem.classes[0]
+        inner = self._solver.negative_pivots - own.constraints - own.gauge.shape[1]
         return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))
 
     @property

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from pneunet.base import se3
 from pneunet.geometry import tags
 from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.sections import rotation
 from pneunet.hifi.fem import surface
 from pneunet.hifi.fem.agreement import gathered
 from pneunet.hifi.fem.mixed_field import MixedField
@@ -58,10 +59,10 @@ class WallDistances:
     def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
         facets = surface.wall_triangles(problem, tags.OUTER)
-        corners = problem.nodes[facets[:, :3]]
         self.facets, wall_of_facet, self.gaps = [], [], []
         wall = 0
         for i, (segment, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
+            corners = problem.nodes[facets[:, :3]] @ rotation(segment)  # in its own axes
             half = segment.chamber_thickness / segment.sin / 2
             centres = start + segment.chamber_positions
             for side in segment.sides:

@@ -16,33 +16,33 @@ from pneunet.hifi.fem.mixed_field import MixedField
 EDGES = [(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]
 
 
-def _of_tetrahedron():
-    """(4, 6) local P2 nodes of the facet opposite each vertex."""
+#: corners of dolfinx's reference hexahedron, x running fastest
+_CUBE = np.array([(i % 2, i // 2 % 2, i // 4) for i in range(8)])
+_CUBE_EDGES = [(a, b) for a, b in combinations(range(8), 2) if np.abs(_CUBE[a] - _CUBE[b]).sum() == 1]
+_CUBE_SIDES = sorted(np.flatnonzero(_CUBE[:, i] == end).tolist() for i in range(3) for end in (0, 1))
+#: cell -> for each of its displacement nodes the corners in whose middle it lies
+VERTICES = {
+    "tetrahedron": [*((i,) for i in range(4)), *EDGES],
+    "hexahedron": [*((i,) for i in range(8)), *_CUBE_EDGES, *map(tuple, _CUBE_SIDES), tuple(range(8))],
+}
+
+
+def _facets(cell, rings):
+    """Local nodes of facets with these rings of corners: corners, middles of edges, a square's own."""
+    number = {tuple(sorted(corners)): node for node, corners in enumerate(VERTICES[cell])}
     rows = []
-    for opposite in range(4):
-        corners = [v for v in range(4) if v != opposite]
-        edges = [tuple(sorted((corners[i], corners[(i + 1) % 3]))) for i in range(3)]
-        rows.append(corners + [4 + EDGES.index(e) for e in edges])
+    for ring in rings:
+        edges = [number[tuple(sorted(pair))] for pair in zip(ring, [*ring[1:], ring[0]])]
+        rows.append([*ring, *edges, *([number[tuple(sorted(ring))]] if len(ring) == 4 else [])])
     return np.array(rows)
 
 
-def _of_hexahedron():
-    """(6, 9) local Q2 nodes of dolfinx's facets, whose vertices, edges and facets are numbered by their own
-    smallest vertices, and those with x running fastest."""
-    vertices = np.array([(i % 2, i // 2 % 2, i // 4) for i in range(8)])
-    pairs = combinations(range(8), 2)
-    edges = [pair for pair in pairs if np.abs(vertices[pair[0]] - vertices[pair[1]]).sum() == 1]
-    sides = [np.flatnonzero(vertices[:, a] == end).tolist() for a in range(3) for end in (0, 1)]
-    rows = []
-    for number, (a, b, c, d) in enumerate(sorted(sides)):
-        ring = [a, b, d, c]
-        around = [8 + edges.index(tuple(sorted((ring[i], ring[(i + 1) % 4])))) for i in range(4)]
-        rows.append([*ring, *around, 20 + number])
-    return np.array(rows)
-
-
-#: cell -> local nodes of its facets
-FACETS = {"tetrahedron": _of_tetrahedron(), "hexahedron": _of_hexahedron()}
+#: cell -> local nodes of its facets: that opposite each vertex of a tetrahedron; of a hexahedron in dolfinx's
+#: order
+FACETS = {
+    "tetrahedron": _facets("tetrahedron", [[v for v in range(4) if v != i] for i in range(4)]),
+    "hexahedron": _facets("hexahedron", [[a, b, d, c] for a, b, c, d in _CUBE_SIDES]),
+}
 
 
 def facet_nodes(problem: MixedField, *tags: int) -> np.ndarray:
@@ -130,9 +130,9 @@ def _collapsed(points):
 
 @dataclass(frozen=True)
 class FacetKind:
-    """corners: how many; turned: the nodes in the order of the other orientation. triangles (t, 3, 2) that its
-    reference shape is made of; barycentric (q, 3) and weights (q,) of a rule on each, exact for displacement
-    times place."""
+    """corners: how many; turned: the nodes in the order of the other orientation. triangles (t, 3, 2) that
+    its reference shape is made of; barycentric (q, 3) and weights (q,) of a rule on each, exact for
+    displacement times place."""
 
     corners: int
     turned: list[int]
@@ -162,12 +162,8 @@ class FacetKind:
 _SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 #: nodes of a facet -> its kind
 KINDS = {
-    6: FacetKind(
-        3, [0, 2, 1, 5, 4, 3], np.array([[[0, 0], [1, 0], [0, 1]]], float), _BARYCENTRIC, _WEIGHTS
-    ),
-    9: FacetKind(
-        4, [0, 3, 2, 1, 7, 6, 5, 4, 8], _SQUARE[[[0, 1, 2], [0, 2, 3]]], *_collapsed(5)
-    ),
+    6: FacetKind(3, [0, 2, 1, 5, 4, 3], np.array([[[0, 0], [1, 0], [0, 1]]], float), _BARYCENTRIC, _WEIGHTS),
+    9: FacetKind(4, [0, 3, 2, 1, 7, 6, 5, 4, 8], _SQUARE[[[0, 1, 2], [0, 2, 3]]], *_collapsed(5)),
 }
 
 
@@ -202,8 +198,8 @@ def _clip(polygon, values, keep_below):
 
 
 class SlabIntegral:
-    """Integrals over the part of a surface with low <= X1 <= high, as weights on its nodes; exact where facets
-    are flat and have parallel edges.
+    """Integrals over the part of a surface with low <= X1 <= high, as weights on its nodes; exact where
+    facets are flat and have parallel edges.
 
     area (mm2); centre (3,) = int X dA; nodes (n,); weights (n,) = int N dA; first (n, 3) = int X N dA.
     places (all local nodes, 3): of the nodes, when they are not the problem's own.

@@ -48,9 +48,9 @@ def _solve(case, out):
         log.info(point.text)
 
     def keep(state: CellState) -> None:
-        states[:] = [state]
         rows.append(_row(state))
         write_csv(out / "cell.csv", CELL, rows)
+        states[:] = [state]
         log.info(_line(state))
 
     def touch(pressure: float) -> None:

@@ -48,6 +48,21 @@ def test_solution_that_stopped_short_is_compared_at_its_own_pressure(tmp_path):
     assert "stops at 12 kPa" in c.notes[0] and "stopped short" in verdict(run, c)
 
 
+def test_groups_are_compared_at_pressures_in_the_designs_proportions_and_rolled_strains_in_one_frame(
+    tmp_path,
+):
+    segments = PLANE, replace(PLANE, roll=180, group=2)
+    make_run(tmp_path, segments, (0.02, 0.01), reached=0.5, fields=False)
+    run, c = judged(tmp_path)
+    assert np.allclose(run.solve.strains.k, FACTOR * c.strains.k)
+    own = [AnalyticLaw().strains(PLANE, p).k[1] for p in (0.01, 0.005)]
+    assert c.strains.k[:, 1] == pytest.approx([own[0], -own[1]])
+    assert "At 10 / 5 kPa" in verdict(run, c) and "design pressure of 20 / 10 kPa" in c.notes[0]
+    path = tmp_path / "design.toml"
+    path.write_text(path.read_text().replace("[20.0, 10.0]", "[20.0, 20.0]"))
+    assert read_design_folder(tmp_path).stale
+
+
 def test_solution_of_another_body_is_left_out_and_told(tmp_path):
     make_run(tmp_path, fields=False)
     assert not read_design_folder(tmp_path).stale

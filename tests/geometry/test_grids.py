@@ -1,8 +1,11 @@
 """Grids of hexahedra: what is in them, that they fit together, that nothing is inside out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.geometry.grids.body import body_grid
 from pneunet.geometry.grids.cell import cell_grid
@@ -11,6 +14,7 @@ from pneunet.geometry.grids.sample import random_manipulator, random_segment
 from pneunet.geometry.meshfile import open_edges
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Manipulator, Segment
 from pneunet.geometry.reference_cases import CASES
+from pneunet.geometry.sections import rotation
 
 KINDS = ("one_sided_w10", "twist_w12")
 
@@ -116,20 +120,11 @@ def test_facets_are_named_after_where_they_lie():
     assert flux == pytest.approx(3 * mesh.volumes().sum(), rel=1e-3)
 
 
-def test_a_bottom_layer_has_its_thickness(material=None):
-    from pneunet.base.materials.laws import NeoHookean
-
-    s = CASES["one_sided_w10"](60.0, 2)
-    s = type(s)(**{**vars_of(s), "layer_thickness": 0.5, "layer_material": NeoHookean(1.0)})
+def test_a_bottom_layer_has_its_thickness():
+    s = replace(CASES["one_sided_w10"](60.0, 2), layer_thickness=0.5, layer_material=NeoHookean(1.0))
     mesh = body_grid(Manipulator([s]), 1.5).mesh()
     layer = mesh.cell_tags == tags.LAYER
     assert mesh.volumes()[layer].sum() == pytest.approx(0.5 * s.width * s.length)
-
-
-def vars_of(segment):
-    from dataclasses import fields
-
-    return {f.name: getattr(segment, f.name) for f in fields(segment)}
 
 
 def body_volume(manipulator):
@@ -156,7 +151,7 @@ def test_a_body_s_volume_is_that_of_its_boxes(name, angles):
 def test_a_taper_is_a_frustum():
     """Two cores of different width: between them, over half the margins, the width goes over linearly."""
     a, b = CASES["one_sided_w10"](90.0, 1), CASES["one_sided_w10"](90.0, 1)
-    b = type(b)(**{**vars_of(b), "width": 14.0, "end_margin": 4.0})
+    b = replace(b, width=14.0, end_margin=4.0)
     body = Manipulator([a, b])
     joint = (a.width * 1 + b.width * 2) / 3
     taper = (a.width + joint) / 2 * 1 + (joint + b.width) / 2 * 2
@@ -165,6 +160,40 @@ def test_a_taper_is_a_frustum():
     flat = (a.width * height - channel) * 1 + (b.width * height - channel) * 2
     exact = body_volume(body) + tapers - flat
     assert body_grid(body, 1.5).mesh().volumes().sum() == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_joint_of_sections_that_are_rolled_against_each_other_keeps_either_segment():
+    """The twisting segment's chambers stand out sideways, where the one-sided has nothing."""
+    a = CASES["one_sided_w10"](60.0, 2)
+    b = replace(CASES["twist_w12"](60.0, 1), width=6.0, roll=90, channel_width=2.0)
+    volumes = [body_grid(Manipulator(m), 2.0).mesh().volumes().sum() for m in ([a], [b], [a, b])]
+    plugs = sum(s.channel_width * s.channel_height * s.end_wall for s in (a, b))
+    # but for the tapers, which keep each dimension's volume and not quite their product's
+    assert volumes[2] == pytest.approx(volumes[0] + volumes[1] - plugs, abs=0.01 * volumes[2])
+
+
+@pytest.mark.parametrize("roll", [90, 180, 270])
+def test_a_rolled_segment_is_the_turned_one(roll):
+    s = replace(CASES["one_sided_w10"](60.0, 2), layer_thickness=0.5, layer_material=NeoHookean(1.0))
+    plain, rolled = (body_grid(Manipulator([each]), 2.0).mesh() for each in (s, replace(s, roll=roll)))
+    turn = rotation(replace(s, roll=roll))
+    for tag in np.unique(plain.cell_tags):
+        centres = [m.points[m.cells[m.cell_tags == tag]].mean(axis=1) for m in (plain, rolled)]
+        assert matched(centres[0] @ turn.T, centres[1])
+    for tag in tags.FACE_NAMES:
+        centres = [m.points[m.tagged(tag)].mean(axis=1) for m in (plain, rolled)]
+        assert matched(centres[0] @ turn.T, centres[1])
+
+
+def test_a_passive_segment_is_core_and_a_group_of_its_own_has_a_cavity_of_its_own():
+    s = CASES["one_sided_w10"](60.0, 2)
+    passive = Manipulator([s, s.plain(10.0), s])
+    own = Manipulator([s, s.plain(10.0), replace(s, group=2)])
+    section = s.width * (s.core_top - s.core_bottom) - s.channel_width * s.channel_height
+    volumes = [body_grid(m, 1.5).mesh().volumes().sum() for m in (Manipulator([s, s]), passive, own)]
+    assert volumes[1] - volumes[0] == pytest.approx(10 * section)
+    bulkhead = s.channel_width * s.channel_height * (s.plain(10.0).end_wall + s.end_wall)
+    assert volumes[2] - volumes[1] == pytest.approx(bulkhead)
 
 
 def test_planes_that_all_but_meet_become_one():

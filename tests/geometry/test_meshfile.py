@@ -21,7 +21,7 @@ GOOD = {
 def test_what_was_written_is_read(tmp_path):
     write_archive(tmp_path / "mesh.npz", SCHEMA, {"element": "tetrahedra", "cells": 1}, GOOD)
     mesh, facts = read_mesh(tmp_path / "mesh.npz")
-    assert facts == {"cells": 1} and (mesh.tagged(tags.CAVITY) == [[1, 2, 3]]).all()
+    assert facts == {"element": "tetrahedra", "cells": 1} and (mesh.tagged(tags.CAVITY) == [[1, 2, 3]]).all()
     assert all((getattr(mesh, name) == array).all() for name, array in GOOD.items())
 
 
@@ -64,7 +64,11 @@ def test_hexahedra_are_read_and_refused_where_they_turn_inside_out(tmp_path):
     made = VolumeMesh(cube, cells, np.array([tags.BODY]), facets, np.array([tags.BASE]))
     made.write(tmp_path / "mesh.npz", {"cells": 1})
     mesh, facts = read_mesh(tmp_path / "mesh.npz")
-    assert facts == {"cells": 1} and mesh.element == "hexahedra" and (mesh.cells == cells).all()
+    assert (
+        facts == {"element": "hexahedra", "cells": 1}
+        and mesh.element == "hexahedra"
+        and (mesh.cells == cells).all()
+    )
     assert mesh.volumes() == pytest.approx([1.0])
     dented = cube.copy()
     dented[6] = [0.4, 0.4, 0.4]  # still of positive volume, but not at this corner

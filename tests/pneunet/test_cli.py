@@ -4,14 +4,17 @@ agree."""
 import csv
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pneunet.base.files.schemas import CELL as CELL_COLUMNS
 from pneunet.base.files.schemas import CENTRELINE, CENTRELINES, POINT, SEGMENTS, SHAPES, STEPS
 from pneunet.geometry.cad.mesh import segment_tables
 from pneunet.geometry.designfile import read_design_file
@@ -277,3 +280,33 @@ def test_fit_material_as_typed(tmp_path):
     out = tmp_path / "out" / "fit-pull"
     assert {p.name for p in out.iterdir()} == {"material.toml", "fit.png"}
     assert (out / "material.toml").read_text().startswith('[material]\nlaw = "neo-Hookean"\nmu_MPa = 0.2\n')
+
+
+CELL = """pressure_kPa = 100
+levels = 200
+mesh_size_mm = 6
+contact = "none"
+[material]
+mu_MPa = 0.3
+[segment]
+kind = "one-sided"
+angle_deg = 90
+"""
+
+
+def test_an_interrupted_cell_keeps_its_levels_and_says_where(tmp_path):
+    (tmp_path / "c.toml").write_text(CELL)
+    line, rows = [PNEUNET, "cell", "c.toml"], tmp_path / "cell" / "cell.csv"
+    process = subprocess.Popen(
+        line, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 200
+    while not rows.exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[1]
+    record = json.loads((tmp_path / "cell" / "run.json").read_text())
+    reached = table(rows, CELL_COLUMNS)[:, CELL_COLUMNS.index("pressure_kPa")][-1]
+    assert process.returncode == 130 and record["status"] == f"interrupted after {reached:.4g} kPa"
+    assert told.startswith(f"pneunet: {record['status']}; ") and len(told.splitlines()) == 1
+    assert not list((tmp_path / "cell").glob(".*"))

@@ -94,6 +94,21 @@ def test_a_bare_number_is_no_pressure():
         predict(FINGER, 30, shipped_law())
 
 
+def test_a_law_asked_beyond_its_path_says_so(caplog):
+    """It knows no strains there, and gives those at the path's end."""
+    from pneunet.reduced import shipped_law
+
+    pn.predict(FINGER, pressure_kPa=20)
+    assert not caplog.messages
+    pn.predict(FINGER, pressure_kPa=2000)
+    assert any("a limit load, or no further, at" in text for text in caplog.messages)
+    caplog.clear()
+    law, segment = shipped_law(), FINGER.segments[0]
+    ends = [law.strains(segment, P).k[1] for P in (0.5, 2.0)]
+    assert ends[0] == ends[1] and len(caplog.messages) == 2
+    assert all("kPa: strains are those there" in text for text in caplog.messages)
+
+
 def test_results_show_themselves_in_a_line(curve, tmp_path):
     target, rod = pn.Target.read(curve), pn.rod(FINGER, pressure_kPa=20)
     design = pn.Design.of(FINGER, pressure_kPa=20, law="analytic")

@@ -11,6 +11,7 @@ from pneunet.base.files.toml import as_table, from_table, number, refuse_unknown
 from pneunet.base.materials.laws import material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.system.processes import Limits
+from pneunet.geometry.designfile import segment_table
 from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.runs.campaign.sample import PLACES, RANGES, prescribed_states, segments
 from pneunet.hifi.runs.cases import Case, case_limits
@@ -168,7 +169,7 @@ def is_held_out(index: int, every: int) -> bool:
 
 def _case(kind, index, mesh, segment, prescribed, common):
     inputs = {
-        "segment": to_table(segment),
+        "segment": segment_table(segment),
         "material": material_to_table(segment.material),
         "mesh": mesh.settings,
         **common,

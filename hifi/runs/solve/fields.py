@@ -10,13 +10,20 @@ from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.agreement import gathered, on_rank_0
-from pneunet.hifi.fem.surface import EDGES
+from pneunet.hifi.fem.surface import VERTICES
 from pneunet.hifi.runs.solve.goal import Goal
 from pneunet.hifi.runs.solve.tables import Tables
 
-QUADRATIC_TETRA = 24
-#: dolfinx's P2 node order -> VTK's
-TO_VTK = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
+#: cell -> VTK's number of it, and dolfinx's node order -> VTK's: quadratic tetrahedra, triquadratic hexahedra
+VTK = {
+    "tetrahedron": (24, [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]),
+    "hexahedron": (
+        29,
+        [0, 1, 3, 2, 4, 5, 7, 6]
+        + [8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 15, 14]
+        + [22, 23, 21, 24, 20, 25, 26],
+    ),
+}
 
 
 class FieldWriter:
@@ -56,15 +63,14 @@ class FieldWriter:
                 old.unlink()
 
     def _pressure_at_nodes(self):
-        """Multiplier at the P2 nodes: corner values, averaged on mid-edges. One value per local displacement
-        node."""
+        """Multiplier at the displacement nodes: corner values, elsewhere the mean of the corners around. One
+        value per local displacement node."""
         corner = self.problem.pressure_field()
         p2 = compat.cell_dofs(self.problem.displacement_space)
         p1 = compat.cell_dofs(self.problem.pressure_space)
         out = np.zeros(len(self.problem.nodes))
-        out[p2[:, :4]] = corner[p1]
-        for i, (a, b) in enumerate(EDGES):
-            out[p2[:, 4 + i]] = (corner[p1[:, a]] + corner[p1[:, b]]) / 2
+        for node, around in enumerate(VERTICES[self.problem.cell_name]):
+            out[p2[:, node]] = corner[p1[:, list(around)]].mean(axis=1)
         return out
 
     def _wall_distance(self):
@@ -90,10 +96,9 @@ class FieldWriter:
     def _save(self, fields, m):
         import pyvista
 
-        cells = np.hstack([np.full((len(self._cells), 1), 10), self._cells[:, TO_VTK]])
-        grid = pyvista.UnstructuredGrid(
-            cells.ravel(), np.full(len(cells), QUADRATIC_TETRA, np.uint8), self._points
-        )
+        kind, order = VTK[self.problem.cell_name]
+        cells = np.hstack([np.full((len(self._cells), 1), len(order)), self._cells[:, order]])
+        grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), kind, np.uint8), self._points)
         for name, values in fields.items():
             grid.point_data[name] = values.astype(np.float32)
         for name, value in m.touch.marks.items():

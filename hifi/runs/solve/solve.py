@@ -32,6 +32,8 @@ from pneunet.hifi.runs.solve.tables import Tables
 
 log = logging.getLogger(__name__)
 
+#: of a run's identity: what its run.json tells
+KEPT = ("loads", "body", "mesh_size_mm", "pressure_shares")
 #: what to do after a full disk
 RESUME = " and go on with pneunet solve --resume"
 
@@ -74,18 +76,24 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     identity = {
         "body": body_tables(design.manipulator),
         "mesh_size_mm": mesh_size,
+        "element": design.element,
         "loads": design.loads.table(),
         "base": design.base_pose.tolist() if design.loads else None,
         "control": goal.control,
         "contact": design.contact,
+        **({"pressure_shares": list(design.shares)} if len(design.shares) > 1 else {}),
     }
     mesh, kept = on_rank_0(comm, lambda: _prepare(design, directory, mesh_size, identity, resume))
     loads = design.loads.in_body(design.base_pose)
     penalty = WallPenalty() if design.contact == "auto" else None
-    solve = ManipulatorSolve(design.manipulator, mesh_path, comm, loads=loads, contact=penalty)
-    tables, writer = Tables(comm, out, solve.walls.gaps), FieldWriter(out, solve, goal) if fields else None
+    log.info("solve: set up; forms that are new to this machine are compiled, up to a minute")
+    solve = ManipulatorSolve(
+        design.manipulator, mesh_path, comm, loads=loads, contact=penalty, shares=design.shares
+    )
+    tables = Tables(comm, out, solve.walls.gaps, design.shares)
+    writer = FieldWriter(out, solve, goal) if fields else None
     log.info(
-        f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size}"
+        f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (Taylor-Hood), {comm.size}"
         f" rank{'s' * (comm.size > 1)}, {goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
     )
     before, last, complete = None, None, False
@@ -104,7 +112,7 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
         solve.destroy()
         return last
     about = {
-        **{name: identity[name] for name in ("loads", "body", "mesh_size_mm")},
+        **{name: value for name, value in identity.items() if name in KEPT},
         "mesh": mesh,
         "cells": mesh["cells"],
         "resumed_after_step": before and before.number,
@@ -129,7 +137,7 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
         raise ConvergenceError(goal.failure(last, solve.stage, reached, result, out))
     if "blocked_force" in missing:
         log.info("blocked force: the same body with its tip held")
-        held = design.manipulator, mesh_path, last.pressure, loads, comm, penalty
+        held = design.manipulator, mesh_path, last.pressure, loads, comm, penalty, design.shares
         extras["blocked_force"] = tip.blocked_force(*held)
         with room_in(out, RESUME):
             record.finished(status, last, result.failures)
@@ -207,14 +215,18 @@ def _mesh(design, folder, mesh_size):
     """Facts of the design's mesh in `folder`, which is made where there is none."""
     from pneunet.geometry.cad.mesh import mesh_manipulator, segment_tables
 
-    wanted = {"mesh_size_mm": mesh_size, "segments": segment_tables(design.manipulator)}
+    wanted = {
+        "element": design.element,
+        "mesh_size_mm": mesh_size,
+        "segments": segment_tables(design.manipulator),
+    }
     if (folder / MESH).exists():
         _, facts = read_mesh(folder / MESH)
         if wanted == {name: facts.get(name) for name in wanted} and facts == _facts_for_people(folder):
             return facts
     if folder.is_dir() and any(folder.glob("m*")):
         log.info(f"{folder}: no {MESH} of this body and mesh size with its mesh.json: meshed anew")
-    return mesh_manipulator(design.manipulator, mesh_size, folder)
+    return mesh_manipulator(design.manipulator, mesh_size, folder, design.element)
 
 
 def _facts_for_people(folder):

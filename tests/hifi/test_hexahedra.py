@@ -1,0 +1,118 @@
+"""Cells on grids of hexahedra: the same solver code, and half turns."""
+
+import numpy as np
+import pytest
+from dolfinx.mesh import CellType
+from mpi4py import MPI
+
+from pneunet.geometry import tags
+from pneunet.geometry.cad.grid import grid_cell
+from pneunet.geometry.reference_cases import CASES
+from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.fem import surface
+from pneunet.hifi.path.control import LoadControl
+from pneunet.hifi.path.equilibrium import EquilibriumPath
+from pneunet.hifi.path.newton import NewtonOptions
+from pneunet.hifi.path.stepping import StepSize, run_steps
+from pneunet.hifi.verification.cells import flexure
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
+
+
+def problem_of(name, folder, size=2.5, part=False):
+    segment, path = CASES[name](60.0, 1), folder / f"{part}.npz"
+    facts = grid_cell(segment, size, path, part=part)
+    return CellProblem(segment, path), facts
+
+
+def solved(problem, pressure):
+    system = CellSystem(problem)
+    path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    run_steps(path, pressure, StepSize(first=0.005, smallest=1e-4))
+    state = system.measure()
+    system.destroy()
+    return state
+
+
+@pytest.mark.parametrize(("name", "copies"), [("one_sided_w10", 2), ("twist_w12", 4)])
+def test_a_part_of_the_cell_and_half_turns_are_the_cell(name, copies, tmp_path):
+    """Its free state, its stiffness, for which perturbations without the symmetry are needed, and what is
+    measured on images of its walls."""
+    (whole, facts), (part, of_part) = (problem_of(name, tmp_path, part=p) for p in (False, True))
+    assert of_part["cells"] * copies == facts["cells"]
+    assert of_part["air_mm3"] == pytest.approx(facts["air_mm3"])
+    assert sum(c.unknowns + c.gauge.shape[1] for c in part.classes) == whole.unknowns + 6
+    states = [solved(problem, 0.02) for problem in (whole, part)]
+    for of in ("strains.vector", "stiffness", "volume", "wall_distance", "largest_stretch", "unstable"):
+        values = []
+        for state in states:
+            value = state
+            for attribute in of.split("."):
+                value = getattr(value, attribute)
+            values.append(value)
+        assert values[1] == pytest.approx(values[0], rel=1e-6, abs=1e-7 * np.abs(values[0]).max()), of
+    e, k = states[1].strains.e, states[1].strains.k
+    zero = [e[2], k[2]] if copies == 2 else [*e[1:], *k[1:]]
+    assert not np.any(zero)
+
+
+def test_all_classes_count_unstable_directions(tmp_path):
+    """Under a pressure that the body cannot hold at rest."""
+    counts = []
+    for part in (False, True):
+        problem, _ = problem_of("twist_w12", tmp_path, 5.0, part)
+        system = CellSystem(problem)
+        system.load = 0.5
+        counts.append(system.measure().unstable)
+        system.destroy()
+    assert counts[0] == counts[1] > 0
+
+
+def test_the_tangent_is_the_slope_of_the_residual(tmp_path):
+    problem, _ = problem_of("twist_w12", tmp_path, 4.0, part=True)
+    system = CellSystem(problem)
+    system.load = 0.01
+    random = np.random.default_rng(3)
+    x = system.state + np.where(np.arange(len(system.state)) < problem.unknowns, 0.01, 0) * random.normal(
+        size=len(system.state)
+    )
+    way = random.normal(size=len(x) - 6) * np.append(
+        np.ones(problem.unknowns), np.zeros(len(x) - 6 - problem.unknowns)
+    )
+    system.state = x
+    matrix, _, _ = problem.tangent()
+    ends = []
+    for h in (1e-5, -1e-5):
+        system.state = x + np.append(h * way, np.zeros(6))
+        ends.append(problem.residual()[0])
+    slope = (ends[0] - ends[1]) / 2e-5
+    assert (matrix @ way)[: problem.unknowns] == pytest.approx(
+        slope, rel=1e-6, abs=1e-8 * np.abs(slope).max()
+    )
+
+
+def test_quadrilaterals_tile_the_channel_s_wall(tmp_path):
+    problem, _ = problem_of("one_sided_w10", tmp_path)
+    s = problem.segment
+    facets = surface.facet_nodes(problem, tags.CHANNEL)
+    # over a pitch, but for where the chamber opens into the channel
+    area = 2 * (s.channel_width + s.channel_height) * s.pitch - s.channel_width * s.cavity_thickness / s.sin
+    assert facets.shape[1] == 9
+    assert surface.reference_areas(problem, facets).sum() == pytest.approx(area)
+    halves = [surface.SlabIntegral(problem, facets, *ends) for ends in ((-np.inf, 0.3), (0.3, np.inf))]
+    assert sum(half.area for half in halves) == pytest.approx(area)
+    # a rigid motion of the nodes is one of the surface
+    both = surface.SlabIntegral(problem, facets)
+    assert both.weights.sum() == pytest.approx(area)
+    assert both.first.sum(axis=0) == pytest.approx(both.centre)
+    a, b, c = (problem.nodes[facets[:, i]] for i in range(3))
+    outward = np.einsum("ni,ni->n", np.cross(b - a, c - a), (a + c) / 2 * [0, 1, 1])
+    assert (outward < 0).all()  # out of the body: towards the axis
+    triangles = surface.wall_triangles(problem, tags.CHANNEL)
+    assert surface.reference_areas(problem, triangles).sum() == pytest.approx(area)
+
+
+def test_a_block_of_hexahedra_bends_as_it_should():
+    for row in flexure((1, 8), element=CellType.hexahedron):
+        assert row.relative_error < 1e-3, row
