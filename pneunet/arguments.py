@@ -43,6 +43,8 @@ def real(text: str) -> float:
 
 def path(text: str) -> Path:
     """A name that a file can have."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name is empty: a variable that is not set?")
     if not text.isprintable() or max(len(part.encode()) for part in Path(text).parts or ("",)) > 255:
         raise argparse.ArgumentTypeError("no file is called so: control characters, or over 255 in a name")
     if len(text) > 3000:
@@ -58,7 +60,8 @@ def pressures(text: str, least: float = math.ulp(0.0)) -> list[float]:
         if math.isnan(value):
             raise argparse.ArgumentTypeError(f"'{word}' is not a number; write for instance 10,20,30")
         if not least <= value <= LARGEST_PRESSURE_KPA:
-            raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
+            allowed = f"0..{LARGEST_PRESSURE_KPA:g} kPa" + ", 0 left out" * bool(least)
+            raise argparse.ArgumentTypeError(f"{value:g} must lie in {allowed}")
         values.append(value)
     return values
 

@@ -24,7 +24,7 @@ FLOORS = {
 #: what lies in the package itself
 ROOMS = {
     "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
-    "geometry": [{""}, {"grids"}, {"cad"}],
+    "geometry": [{""}, {"grids", "moulds"}, {"cad"}],
     "hifi": [
         {"fem"},
         {"path"},
