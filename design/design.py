@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 import scipy
 
-from pneunet.base.files.atomic import write_csv
+from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
+from pneunet.design.segmentation.segmentation import piece_tables
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
@@ -35,6 +36,11 @@ if TYPE_CHECKING:
     from pneunet.design.search.tolerances import Tolerances
     from pneunet.geometry.moulds.parameters import Moulds
 
+#: how split.toml begins
+SPLIT = """# The split that this design follows: edited, a target of its own, or tables for yours.
+points = "target.csv"
+
+"""
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
 log = logging.getLogger(__name__)
@@ -186,14 +192,16 @@ class Design:
         return folder
 
     def write(self, directory: Path) -> None:
-        """Write design.toml, centreline.csv, run.json, with a target target.csv and with matplotlib
-        design.png. InputError where it cannot be written to."""
+        """Write design.toml, centreline.csv, run.json, with a target target.csv and split.toml, with
+        matplotlib design.png. InputError where it cannot be written to."""
         from pneunet.base.pictures import rendering
 
         content, line = self.content, self.prediction
         if self.target is not None:
             write_csv(directory / "target.csv", POINT, self.target.points)
             content = replace(content, target="target.csv")
+            if content.result.get("piece"):
+                write_text(directory / "split.toml", SPLIT + piece_tables(content.result["piece"]))
         write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
         write_design_file(directory / "design.toml", content)
         versions = {"numpy": np.__version__, "scipy": scipy.__version__}
