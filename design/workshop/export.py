@@ -21,7 +21,6 @@ from pneunet.design.workshop.sheet import Pack, amounts, sections
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.moulds.layers import runs
 from pneunet.geometry.moulds.parameters import Moulds, printed
-from pneunet.geometry.moulds.part import Part
 from pneunet.reduced.rod.laws import SegmentLaw
 
 log = logging.getLogger(__name__)

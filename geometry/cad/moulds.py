@@ -17,7 +17,7 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad.meshing import TRIANGLE, write_model
-from pneunet.geometry.moulds.layers import LOWER, MIDDLE, UPPER, Placed, Run, runs
+from pneunet.geometry.moulds.layers import LOWER, MIDDLE, UPPER, Run, runs
 from pneunet.geometry.moulds.parameters import Moulds, printed
 from pneunet.geometry.moulds.part import Part
 from pneunet.geometry.parameters import Manipulator
