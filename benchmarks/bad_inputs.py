@@ -46,6 +46,15 @@ GOOD_TABLES: dict[str, dict] = {
     "target.toml": {
         "points": "curve.csv",
         "pressure_range_kPa": [5.0, 40.0],
+        "weights": [1.0, 1.0, 1.0, 1.0, 1.0, 0.0],
+        "gravity_m_per_s2": [0.0, 0.0, -9.81],
+        "casting": {
+            "grid_mm": 0.1,
+            "walls_mm": [1.0, 1.5],
+            "allow_touch": False,
+            "silicones": ["Ecoflex 00-10"],
+        },
+        "shape": [{"points": "curve.csv", "pressure_kPa": 20.0}],
         "base": {"direction": [1.0, 0.0, 0.0], "width_direction": [0.0, 0.0, 1.0]},
         "material": MATERIAL,
         "segment": {"width_mm": 10.0, "wall_mm": 1.2},

@@ -26,8 +26,8 @@ KINDS = ("passive", "twisting", "bending", "helical")
 
 @dataclass(frozen=True)
 class RandomTarget:
-    """points (150, 3) with noise, mm; kinds, lengths (n,) mm and strains (n, 2) = (k1, k2) 1/mm of the pieces;
-    pose (4, 4) of the section frame at the start."""
+    """points (150, 3) with noise, mm; kinds, lengths (n,) in mm and strains (n, 2) = (k1, k2) in 1/mm of the
+    pieces; pose (4, 4) of the section frame at the start."""
 
     points: np.ndarray
     kinds: tuple[str, ...]

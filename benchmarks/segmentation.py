@@ -13,20 +13,20 @@ SAMPLES = 0.02  # mm between the points of a true curve that distances are measu
 
 
 def _truth(target: RandomTarget, data):
-    """The `Fit` of the true split to the points, from the true rod on."""
-    from pneunet.design.segmentation.fit import Fit, refined
-    from pneunet.design.segmentation.rod import Rod
+    """The `RodFit` of the true split to the points, from the true rod on."""
+    from pneunet.design.segmentation.fit import RodFit, refined
+    from pneunet.design.segmentation.rod import PiecewiseRod
     from pneunet.design.segmentation.search import untwisted
 
     ends = np.cumsum(target.lengths)
-    rod = Rod(target.pose, ends[:-1], target.strains)
+    rod = PiecewiseRod(target.pose, ends[:-1], target.strains)
     free = np.array([[k in ("twisting", "helical"), k in ("bending", "helical")] for k in target.kinds])
     s = np.linspace(0, ends[-1], 4000)
     distances = np.sum((target.points[:, None] - target.exact(s)) ** 2, axis=2)
     # the order of the points is known: far turns that pass close by are not their feet
     guess = np.linspace(0, ends[-1], len(target.points))
     distances[abs(s - guess[:, None]) > 0.3 * ends[-1]] = np.inf
-    fit = refined(Fit(data, rod, free, s[np.argmin(distances, axis=1)]), 60, 1e-4)
+    fit = refined(RodFit(data, rod, free, s[np.argmin(distances, axis=1)]), 60, 1e-4)
     return refined(untwisted(fit), 60, 1e-4)
 
 
@@ -40,7 +40,7 @@ def _told(truth) -> bool:
 
 
 def _distances(target, fit):
-    """(how far each joint is from the true one in arc length of the true curve, RMS distance of the curves)."""
+    """(how far each joint is from the true one along the true curve, RMS distance of the curves), mm."""
     length = target.lengths.sum()
     s = np.arange(0, length, SAMPLES)
     exact = target.exact(s)
@@ -64,7 +64,7 @@ def _distances(target, fit):
 
 
 def segmentation(count: int | None = None, noise: float = NOISE, seed: int | None = None):
-    """Figures of the part, with the targets that went wrong as details."""
+    """Figures of the part, with the targets that went wrong as details; other arguments for studies."""
     from pneunet.design.segmentation.segment import fitted
     from pneunet.design.target.target import Target
 

@@ -4,6 +4,7 @@ back.
 This is the one module of design that knows of hifi, and only inside functions.
 """
 
+import logging
 import signal
 import subprocess
 import sys
@@ -19,12 +20,11 @@ from pneunet.base.files.folder import output_folder
 from pneunet.base.files.results import Results, read_run
 from pneunet.base.files.toml import toml_text
 from pneunet.base.units import in_MPa
-from pneunet.design.design import Design
-from pneunet.design.report.rundata import Solution, read_design_folder
 from pneunet.geometry.parameters import Segment
 from pneunet.reduced.choice import choose_law
 
 DONE, BAD_INPUT = 0, 2
+log = logging.getLogger(__name__)
 
 
 def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
@@ -33,6 +33,8 @@ def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
     InputError or ConvergenceError with what the command said where it ends with exit code 2, RuntimeError
     where it ends otherwise. An interrupt is passed on, and the command ends as it does from a terminal.
     """
+    if not isinstance(ranks, int) or ranks < 1:
+        raise InputError(f"ranks = {ranks!r} must be a whole number, at least 1")
     program = [sys.executable, "-P", "-m", "pneunet", *arguments]
     if ranks > 1:
         program[4:4] = ["run", "-n", str(ranks)]
@@ -57,32 +59,6 @@ def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
         raise ConvergenceError(text) if "stopped at" in text else InputError(text)
     if code != DONE:
         raise RuntimeError(f"pneunet {' '.join(arguments)} ended with exit code {code}: {why[-2000:]}")
-
-
-def solve(
-    design: Design,
-    directory: str | Path,
-    ranks: int = 1,
-    pressure_kPa: float | None = None,
-    mesh_size_mm: float | None = None,
-    fields: bool = True,
-    resume: bool = False,
-) -> Solution:
-    """Design.solve."""
-    arguments = []
-    if pressure_kPa is not None:
-        in_MPa(pressure_kPa)  # before anything is written
-        arguments += ["--pressure-kPa", repr(float(pressure_kPa))]
-    if mesh_size_mm is not None:
-        arguments += ["--mesh-size-mm", repr(float(mesh_size_mm))]
-    arguments += ["--no-fields"] * (not fields) + ["--resume"] * resume
-    folder = design.save(directory)
-    run_command(["solve", str(folder / "design.toml"), *arguments], ranks)
-    found = read_design_folder(folder)
-    found.require_whole()
-    solution = found.solve
-    assert solution is not None, "a solve that ends well leaves its tables"
-    return solution
 
 
 def solve_cell(
@@ -138,6 +114,7 @@ def suggest(
         who = campaign_path if kind in known else f"--law {law}"
         raise InputError(f"--kind {kind}: {who} does not know it")
     offered = on_offer(campaign, kind, of)
+    log.info(f"# {number} of {len(offered)} designs are chosen one after the other")
     shape = np.array([shape_numbers(segment) for _, segment in offered])
     top, share = (campaign.table[key] for key in ("top_pressure", "limit_share"))
     rows = most_telling(known[kind], shape, number, top, share, touching)

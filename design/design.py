@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 import scipy
 
-from pneunet.base.files.atomic import write_csv
+from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
+from pneunet.design.segmentation.segmentation import piece_tables
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
@@ -34,7 +35,13 @@ if TYPE_CHECKING:
     from pneunet.design.report.rundata import Solution
     from pneunet.design.search.inverse import Candidate
     from pneunet.design.search.tolerances import Tolerances
+    from pneunet.geometry.moulds.parameters import Moulds
 
+#: how split.toml begins
+SPLIT = """# The split that this design follows: edited, a target of its own, or tables for yours.
+points = "target.csv"
+
+"""
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
 #: of the length, by which elements of a loaded rod may be off
@@ -192,14 +199,16 @@ class Design:
         return folder
 
     def write(self, directory: Path) -> None:
-        """Write design.toml, centreline.csv, run.json, with a target target.csv and with matplotlib
-        design.png. InputError where it cannot be written to."""
+        """Write design.toml, centreline.csv, run.json, with a target target.csv and split.toml, with
+        matplotlib design.png. InputError where it cannot be written to."""
         from pneunet.base.pictures import rendering
 
         content, line = self.content, self.prediction
         if self.target is not None:
             write_csv(directory / "target.csv", POINT, self.target.points)
             content = replace(content, target="target.csv")
+            if content.result.get("piece"):
+                write_text(directory / "split.toml", SPLIT + piece_tables(content.result["piece"]))
         write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
         write_design_file(directory / "design.toml", content)
         versions = {"numpy": np.__version__, "scipy": scipy.__version__}
@@ -216,6 +225,25 @@ class Design:
         from pneunet.design.report.pictures import design_figure
 
         return design_figure(self.content, self.prediction, self.target, self.errors)
+
+    def export(self, directory: str | Path, moulds: "Moulds | str | Path | None" = None) -> Path:
+        """Write what a workshop needs to cast it to directory/workshop, the path of which is returned: STEP
+        and STL of the body and its moulds, a sheet as HTML and PDF.
+
+        moulds: printer, draft, clearances, ..., or a TOML file of them. A finite element solution of this
+        body in the folder tells the limits of the pressure. InputError where moulds or files are wrong.
+        """
+        from pneunet.design.report.rundata import read_design_folder
+        from pneunet.design.workshop.export import read_moulds, write_pack
+
+        if isinstance(moulds, (str, Path)):
+            moulds = read_moulds(moulds)
+        solved = None
+        if (Path(directory) / "design.toml").exists():
+            there = read_design_folder(directory)
+            same = there.design.manipulator == self.manipulator and there.design.shares == self.content.shares
+            solved = there.solve if same else None
+        return write_pack(self.content, directory, self.law, moulds, solved)
 
     def solve(
         self,
@@ -234,9 +262,22 @@ class Design:
         the last accepted step of a run that was ended. Progress is shown line by line. InputError on bad
         input, ConvergenceError (with everything accepted on disk) where the pressure cannot be reached.
         """
-        from pneunet.design.chain import solve
+        from pneunet.design.chain import run_command
+        from pneunet.design.report.rundata import read_design_folder
 
-        return solve(self, directory, ranks, pressure_kPa, mesh_size_mm, fields, resume)
+        arguments = []
+        if pressure_kPa is not None:
+            in_MPa(pressure_kPa)  # before anything is written
+            arguments += ["--pressure-kPa", repr(float(pressure_kPa))]
+        if mesh_size_mm is not None:
+            arguments += ["--mesh-size-mm", repr(float(mesh_size_mm))]
+        arguments += ["--no-fields"] * (not fields) + ["--resume"] * resume
+        folder = self.save(directory)
+        run_command(["solve", str(folder / "design.toml"), *arguments], ranks)
+        found = read_design_folder(folder)
+        found.require_whole()
+        assert found.solve is not None, "a solve that ends well leaves its tables"
+        return found.solve
 
 
 def chosen_law(law: str | SegmentLaw) -> SegmentLaw:

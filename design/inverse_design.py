@@ -113,7 +113,7 @@ def as_target(target: Target | str | Path | np.ndarray) -> Target:
     """A Target from itself, from its file or from points (n, 3) in mm; InputError for one that cannot be."""
     if isinstance(target, Target):
         return target
-    return Target.read(target) if isinstance(target, str | Path) else Target(np.asarray(target, float))
+    return Target.read(target) if isinstance(target, str | Path) else Target(target)
 
 
 def run_design(

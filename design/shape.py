@@ -13,21 +13,29 @@ from pneunet.base.files.atomic import atomic_path, write_csv
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import SHAPES
+from pneunet.base.pictures.painting import paint, show_scale_and_axes, write_text_on
+from pneunet.base.pictures.rendering import view_of
+from pneunet.base.pictures.vtp import write_quads
 from pneunet.base.units import in_MPa
 from pneunet.design.design import Design
-from pneunet.design.report.labels import plain
+from pneunet.design.report.labels import plain, rgb, segment_colour
 from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import read_design_file
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.outline import body_surface
 from pneunet.reduced.rod.overlap import overlap_doubts
 from pneunet.reduced.rod.prediction import doubts
 
 log = logging.getLogger(__name__)
 STEPS = 5
 FRAMES = 24
-FRAME_PIXELS = (540, 432)
+FRAME_PIXELS, PANEL_PIXELS = (540, 432), (600, 480)
+#: of a frame
+COLOURS = 64
+#: mm, of the faces of pictures
+SPACING = 2.0
 
 
 def run_shape(
@@ -51,6 +59,17 @@ def run_shape(
         pressures_kPa = [design.pressure_kPa * i / STEPS for i in range(1, STEPS + 1)]
     if not len(pressures_kPa):
         raise InputError("--pressure-kPa: give at least one pressure")
+    count = len(design.manipulator.segments)
+    log.info(
+        f"shape: {design.content.name}, {count} segment{'s' * (count > 1)} at {_list(pressures_kPa)} kPa"
+    )
+    with output_folder(Path(directory) / "shape") as folder:
+        _predict(folder, design_path, design, pressures_kPa, outside)
+    return folder
+
+
+def _predict(folder, design_path, design, pressures_kPa, outside):
+    """The shapes of `run_shape`, what is to be said of them, and their files."""
     shapes: dict[float, Centreline] = {}
     failed: dict[float, str] = {}
     for p in sorted(set(pressures_kPa)):
@@ -66,9 +85,7 @@ def run_shape(
     overlaps = ((p, text) for p, line in shapes.items() for text in overlap_doubts(design.manipulator, line))
     doubted += tuple(f"from {plain(p)} kPa on {text}" for p, text in islice(overlaps, 1))
     tell_doubts(doubted, design.law, outside)
-    with output_folder(Path(directory) / "shape") as folder:
-        _write(folder, design_path, design, shapes, failed, doubted)
-    return folder
+    _write(folder, design_path, design, shapes, failed, doubted)
 
 
 def _write(folder, design_path, design, shapes, failed, doubted):
@@ -106,13 +123,11 @@ def _list(pressures):
 
 
 def _pictures(design, pressures, folder):
-    from pneunet.base.pictures.rendering import save_vtk
-
-    bodies, view = _bodies(design, pressures)
-    for p, body in zip(pressures, bodies):
-        save_vtk(body, folder / f"body_{plain(p)}kPa.vtp")
-    _picture_of_all(design, view, pressures, bodies, folder / "bodies.png")
-    log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
+    bodies = _bodies(design, pressures)
+    for p, (vertices, quads, segments) in zip(pressures, bodies):
+        write_quads(folder / f"body_{plain(p)}kPa.vtp", vertices, quads, {"segment": segments + 1})
+    _picture_of_all(design.content.name, pressures, bodies, folder / "bodies.png")
+    log.info(f"bodies at every pressure: {folder / 'bodies.png'}; {FRAMES} frames of the inflation follow")
     highest = max(pressures)
     if highest > 0:
         _animation(design, highest, folder / "inflation.gif")
@@ -120,60 +135,51 @@ def _pictures(design, pressures, folder):
 
 
 def _bodies(design, pressures):
-    """(a mesh a pressure in kPa, the View that holds them all)."""
-    from pneunet.base.pictures.rendering import view_of
-    from pneunet.design.report.bodies import body_mesh
-
+    """`body_surface` at pressures in kPa."""
     pose = design.content.base_pose
-    bodies = [
-        body_mesh(design.manipulator, design.content.scaled(in_MPa(p)), design.law, pose) for p in pressures
-    ]
-    return bodies, view_of(np.vstack([body.points for body in bodies]))
+    scaled = [design.content.scaled(in_MPa(p)) for p in pressures]
+    return [body_surface(design.manipulator, p, design.law, SPACING, pose) for p in scaled]
 
 
-def _picture_of_all(design, view, pressures, bodies, path):
+def _view(bodies):
+    """The View that holds them all."""
+    return view_of(np.vstack([vertices for vertices, _, _ in bodies]))
+
+
+def _painted(view, body, pixels):
+    vertices, quads, segments = body
+    colours = np.array([rgb(segment_colour(i)) for i in range(segments.max() + 1)])
+    return paint(view, vertices, quads, colours[segments], pixels)
+
+
+def _picture_of_all(name, pressures, bodies, path):
     """One panel a pressure, same camera and scale."""
-    from pneunet.base.pictures.rendering import figure, render, save, show
-    from pneunet.design.report.bodies import painted
+    from PIL import Image
 
-    columns = min(len(bodies), 3)
-    rows = -(-len(bodies) // columns)
-    width, height = 5.0 * columns, 4.3 * rows + 0.5
-    fig = figure(width, height)
+    (width, height), view, columns = PANEL_PIXELS, _view(bodies), min(len(bodies), 3)
+    rows, top = -(-len(bodies) // columns), height // 10
+    sheet = Image.new("RGB", (columns * width, rows * height + top), "white")
     for number, (p, body) in enumerate(zip(pressures, bodies)):
-        column, row = number % columns, number // columns
-        top = height - 0.5 - 4.3 * row
-        show(
-            fig.add_axes([5.0 * column / width, (top - 4.3) / height, 5.0 / width, 4.0 / height]),
-            view,
-            render(view, painted(body)),
-        )
-        fig.text(
-            (5.0 * column + 0.2) / width,
-            (top - 0.1) / height,
-            f"{plain(p)} kPa",
-            fontsize=13,
-            weight="bold",
-            va="top",
-        )
-    title = f"{design.content.name}: reduced model"
-    fig.text(0.2 / width, 1 - 0.12 / height, title, fontsize=16, weight="bold", va="top")
-    save(fig, path, dpi=90)
+        panel = _painted(view, body, PANEL_PIXELS)
+        show_scale_and_axes(panel, view)
+        write_text_on(panel, (20, 16), f"{plain(p)} kPa", height / 24, "la")
+        sheet.paste(panel, (number % columns * width, top + number // columns * height))
+    write_text_on(sheet, (20, 14), f"{name}: reduced model", height / 18, "la")
+    with atomic_path(path) as temporary:
+        sheet.save(temporary)
 
 
 def _animation(design, highest, path):
     """A GIF that inflates to `highest` (kPa) and holds; 24 frames of a few kB each."""
-    from PIL import Image, ImageDraw
-
-    from pneunet.base.pictures.rendering import render
-    from pneunet.design.report.bodies import painted
+    from PIL import Image
 
     pressures, frames = highest * np.linspace(0, 1, FRAMES), []
-    bodies, view = _bodies(design, pressures)
+    bodies = _bodies(design, pressures)
+    view = _view(bodies)
     for p, body in zip(pressures, bodies):
-        frame = Image.fromarray(render(view, painted(body), FRAME_PIXELS))
-        ImageDraw.Draw(frame).text((12, 10), f"{p:.0f} kPa", fill=(0, 0, 0))
-        frames.append(frame.quantize(64))
+        frame = _painted(view, body, FRAME_PIXELS)
+        write_text_on(frame, (12, 10), f"{p:.0f} kPa", FRAME_PIXELS[1] / 22, "la")
+        frames.append(frame.quantize(COLOURS, Image.Quantize.FASTOCTREE))
     durations = [90] * (FRAMES - 1) + [1200]
     with atomic_path(path) as temporary:
         frames[0].save(temporary, save_all=True, append_images=frames[1:], duration=durations, loop=0)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,8 +52,10 @@ REACH = (
         "curvature_per_m",
         "torsion_rad_per_m",
     ),
-    *("cylinder_curvature_per_m", "pitch_mm"),
+    *("cylinder_curvature_per_m", "pitch_mm", "doubted"),
 )
+#: a law's excess that is a doubt: more than what rounding does at the edge of what it knows
+DOUBT = 1e-3
 #: shapes that are computed at once
 BLOCK = 5000
 MOST_SEGMENTS = 8
@@ -160,13 +162,15 @@ def _chains(value, where):
 @dataclass(frozen=True, eq=False)
 class Cloud:
     """Shapes of one chain of kinds: angles (n, m) in degrees, pressures (n,) in MPa, tips (n, 3) in mm and
-    directions (n, 3) there, from a base at the origin along x whose width lies along y."""
+    directions (n, 3) there, from a base at the origin along x whose width lies along y; doubted (n,): whether
+    the law doubts one of the segments."""
 
     chain: tuple[str, ...]
     angles: np.ndarray
     pressures: np.ndarray
     tips: np.ndarray
     directions: np.ndarray
+    doubted: np.ndarray
 
     @property
     def name(self) -> str:
@@ -175,11 +179,13 @@ class Cloud:
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
-    """reach: {kind: Reach}; clouds: of each chain; lost: shapes without an equilibrium."""
+    """reach: {kind: Reach}; doubted: {kind: (angles, pressures) whether the law doubts it}; clouds: of each
+    chain; lost: shapes without an equilibrium."""
 
     case: WorkspaceCase
     law: SegmentLaw
     reach: dict[str, Reach]
+    doubted: dict[str, np.ndarray]
     clouds: tuple[Cloud, ...]
     lost: int
     seconds: float
@@ -190,6 +196,7 @@ class Workspace:
     def rows(self) -> Iterator[list]:
         """Of reach.csv; a cell is empty where a kind has no such number."""
         for kind, found in self.reach.items():
+            doubted = self.doubted[kind]
             q = found.strains
             curved = (q.frenet_curvature, q.frenet_torsion, q.helix_cylinder_curvature)
             helix = [*(c / PER_MM_PER_M for c in curved), q.helix_pitch]
@@ -200,7 +207,7 @@ class Workspace:
                         if kind == TWISTING
                         else ["", *(c[i, j] for c in helix)]
                     )
-                    yield [kind, angle, KPA_PER_MPA * pressure, q.stretch[i, j], *own]
+                    yield [kind, angle, KPA_PER_MPA * pressure, q.stretch[i, j], *own, int(doubted[i, j])]
 
     def save(self, directory: str | Path) -> Path:
         """`write` to a folder, which is made if need be; the folder."""
@@ -211,17 +218,19 @@ class Workspace:
     def write(self, directory: Path) -> None:
         """Write reach.csv, tips.npz, run.json and, with matplotlib, workspace.png."""
         write_csv(directory / "reach.csv", REACH, self.rows())
-        arrays = {}
+        arrays: dict[str, np.ndarray] = {}
         for number_, cloud in enumerate(self.clouds, start=1):
             arrays |= {
                 f"tip_mm_{number_}": cloud.tips.astype(np.float32),
                 f"direction_{number_}": cloud.directions.astype(np.float32),
                 f"angle_deg_{number_}": cloud.angles.astype(np.float32),
                 f"pressure_kPa_{number_}": (KPA_PER_MPA * cloud.pressures).astype(np.float32),
+                f"doubted_{number_}": cloud.doubted,
             }
-        about = {"chains": [list(cloud.chain) for cloud in self.clouds], "law": self.law.name}
+        about: dict[str, Any] = {"chains": [list(cloud.chain) for cloud in self.clouds], "law": self.law.name}
         write_archive(directory / "tips.npz", SCHEMA, about, arrays, compress=True)
-        entries = {"shapes": sum(len(c.tips) for c in self.clouds), "without_equilibrium": self.lost}
+        entries: dict[str, Any] = {"shapes": sum(len(c.tips) for c in self.clouds)}
+        entries |= {"without_equilibrium": self.lost}
         write_record(directory, case=self.case.name, **about, **entries, wall_seconds=round(self.seconds, 2))
         try:
             rendering.save(self.plot(), directory / "workspace.png")
@@ -258,15 +267,17 @@ def workspace(
     case = case if isinstance(case, WorkspaceCase) else WorkspaceCase.read(case) if case else WorkspaceCase()
     angles, pressures = case.angle_grid, np.array(case.pressures)
     log.info(f"workspace {case.name}: {len(angles)} angles, {len(pressures)} pressures, law '{law.name}'")
-    reaches, tables = {}, {}
+    reaches, tables, doubted = {}, {}, {}
     for kind in case.kinds:
+        segments = [case.segment(kind, float(a)) for a in angles]
         reaches[kind] = reach(case.segment(kind, 90.0), pressures, law, angles)
-        tables[kind] = _table([case.segment(kind, float(a)) for a in angles], reaches[kind].strains)
+        tables[kind] = _table(segments, reaches[kind].strains)
         told = reaches[kind].ranges()
         log.info(
             f"  {kind}: curvature up to {told['curvature'][1] / PER_MM_PER_M:.1f} 1/m,"
             f" twist {told['twist'][0]:.4f}..{told['twist'][1]:.4f} rad/mm"
         )
+        doubted[kind] = _doubted(segments, pressures, law)
     loaded = np.flatnonzero(pressures > 0)
     clouds, lost = [], 0
     for chain, count in zip(case.chains, _shares(case, len(angles), len(loaded))):
@@ -277,10 +288,24 @@ def workspace(
         known = np.isfinite(found).all(axis=1)
         lost += int((~known).sum())
         picks, found = picks[known], found[known]
-        at = pressures[loaded[picks[:, 0]]]
-        clouds.append(Cloud(chain, angles[picks[:, 1:]], at, found[:, :3], found[:, 3:]))
+        at = loaded[picks[:, 0]]
+        doubts = np.any([doubted[kind][picks[:, 1 + i], at] for i, kind in enumerate(chain)], axis=0)
+        clouds.append(Cloud(chain, angles[picks[:, 1:]], pressures[at], found[:, :3], found[:, 3:], doubts))
         log.info(f"  {clouds[-1].name}: {len(found)} shapes, {time.perf_counter() - started:.1f} s")
-    return Workspace(case, law, reaches, tuple(clouds), lost, time.perf_counter() - started)
+    return Workspace(case, law, reaches, doubted, tuple(clouds), lost, time.perf_counter() - started)
+
+
+def _doubted(segments, pressures, law):
+    """(segments, pressures) whether the law doubts a state; the worst of its reasons is told."""
+    excess = np.array([[law.excess(s, float(P)).max() for P in pressures] for s in segments])
+    found = excess > DOUBT
+    if found.any():
+        i, j = np.unravel_index(excess.argmax(), excess.shape)
+        lowest = KPA_PER_MPA * pressures[found.any(axis=0)].min()
+        reasons = "; ".join(law.doubts(segments[i], float(pressures[j])))
+        share = f"{100 * found.mean():.0f} % of these are doubted, from {lowest:g} kPa on"
+        log.warning(f"  warning: {share}, most at {segments[i].angle:g} deg: {reasons}")
+    return found
 
 
 def run_workspace(

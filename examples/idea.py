@@ -139,8 +139,8 @@ def body(design, law):
         mesh = body_mesh(design.manipulator, design.pressure, law, design.base_pose)
         return painted(mesh), mesh.points, "outline carried by the rod", None
     surface, (lines, _) = deformed_surface(read_solution(path), design.base_pose)
-    limits = (1.0, float(np.percentile(surface.point_data["stretch"], 99)))
-    return [lit(surface, "stretch", limits), (lines, EDGES)], surface.points, "finite elements", limits
+    limits = (1.0, float(np.percentile(surface.point_data["mean_stretch"], 99)))
+    return [lit(surface, "mean_stretch", limits), (lines, EDGES)], surface.points, "finite elements", limits
 
 
 def colour_bar(fig, place, limits, label, extend="neither"):

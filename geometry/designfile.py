@@ -21,6 +21,7 @@ from pneunet.base.materials.laws import Hyperelastic, material_from_table, mater
 from pneunet.base.quantities import Checked, quantities, quantity, rounded, shown
 from pneunet.base.units import KPA_PER_MPA, LARGEST_PRESSURE_KPA
 from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_control
+from pneunet.geometry.meshfile import ELEMENTS
 from pneunet.geometry.parameters import NO_CHAMBERS, OF_CHAMBERS, PASSIVE, PLAIN, Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
@@ -33,10 +34,11 @@ class DesignFile(Checked):
     """What the commands mesh, shape and solve read.
 
     pressure in MPa: one for all, or a tuple of one for each group of segments; base_pose (4, 4): the base
-    frame in the target's coordinates (mm); mesh_size in mm; target: text that names the target file; result:
-    free table of numbers that `pneunet design` adds and nobody reads back. loads, control, measure and
-    contact ('auto': walls of neighbouring chambers that touch are held apart; 'none': they are not) are for
-    the finite elements alone; a pressure of 0 everywhere goes with loads only.
+    frame in the target's coordinates (mm); mesh_size in mm; element: tetrahedra of gmsh's or hexahedra of a
+    grid; target: text that names the target file; result: free table of numbers that `pneunet design` adds
+    and nobody reads back. loads, control, measure and contact ('auto': walls of neighbouring chambers that
+    touch are held apart; 'none': they are not) are for the finite elements alone; a pressure of 0 everywhere
+    goes with loads only.
     """
 
     manipulator: Manipulator
@@ -44,6 +46,7 @@ class DesignFile(Checked):
     name: str = quantity(None, "design")
     base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
     mesh_size: float = quantity("mm", 2.0, low=0.1, high=20)
+    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
     target: str = quantity(None, "")
     result: dict = field(default_factory=dict)
     loads: DeadLoads = DeadLoads()
@@ -69,12 +72,17 @@ class DesignFile(Checked):
         """That of the group with the largest, MPa: what "the pressure" of a body with several means."""
         return float(np.max(self.pressure))
 
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """(groups,) each pressure over the largest; all 1 where all are 0."""
+        each, largest = np.broadcast_to(self.pressure, len(self.manipulator.groups)), self.largest_pressure
+        return tuple((each / largest).tolist()) if largest else (1.0,) * len(each)
+
     def scaled(self, largest: float) -> float | tuple[float, ...]:
-        """The pressures in the same proportions, the largest of them `largest` (MPa); of groups that are all
-        at 0, all the same."""
+        """The pressures in the same proportions, the largest of them `largest` (MPa)."""
         if not isinstance(self.pressure, tuple):
             return largest
-        return tuple(largest * p / self.largest_pressure for p in self.pressure)
+        return tuple(largest * share for share in self.shares)
 
 
 TABLES = ("material", "layer_material", "segment", "base", "result", "loads", "measure")

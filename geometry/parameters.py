@@ -18,6 +18,7 @@ from pneunet.base.errors import InputError, located
 from pneunet.base.materials.laws import BODY_LIMITS, Hyperelastic, NeoHookean
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.geometry.sections import joint_is_covered
+from pneunet.geometry.tags import MOST_GROUPS
 
 ONE_SIDED, TWISTING, PASSIVE = "one-sided", "twisting", "passive"
 #: with chambers: what a unit cell can be of, and a law can learn
@@ -82,7 +83,12 @@ class Segment(Checked):
         choices=ROLLS,
     )
     group: int = quantity(
-        None, 1, "segments with one number share a cavity, so a pressure", key="pressure_group", low=1
+        None,
+        1,
+        "segments with one number share a cavity, so a pressure",
+        key="pressure_group",
+        low=1,
+        high=MOST_GROUPS,
     )
     material: Hyperelastic = NeoHookean(mu=0.317)
     layer_material: Hyperelastic | None = None

@@ -6,6 +6,7 @@ anything else is a bug and shows its traceback.
 """
 
 import errno
+import logging
 import os
 import sys
 from argparse import Namespace
@@ -22,6 +23,7 @@ from pneunet.base.units import MPA_PER_KPA
 
 #: exit code of a design that is written, but does not follow its target
 NOT_FOLLOWED = 3
+log = logging.getLogger(__name__)
 
 
 def design(a: Namespace) -> int:
@@ -46,10 +48,17 @@ def mesh(a: Namespace) -> None:
     mesh_design(a.design, a.output or a.design.parent, a.mesh_size_mm)
 
 
+def export(a: Namespace) -> None:
+    from pneunet.front import read_design
+
+    read_design(a.design).export(a.output or a.design.parent, a.moulds)
+
+
 def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
     content = read_design_file(a.design)  # before finite elements are loaded, which takes a while
+    log.info(f"solve: {content.name}; finite elements are loaded")
     from pneunet.hifi.runs.solve.solve import solve_design
 
     pressure = None if a.pressure is None else a.pressure * MPA_PER_KPA
@@ -58,18 +67,21 @@ def solve(a: Namespace) -> None:
 
 
 def cell(a: Namespace) -> None:
+    log.info(f"cell: {a.cell}; finite elements are loaded")
     from pneunet.hifi.runs.cell import run_cell
 
     run_cell(a.cell, a.output or a.cell.parent)
 
 
 def study(a: Namespace) -> None:
+    log.info(f"study: {a.study}; finite elements are loaded")
     from pneunet.hifi.runs.study.study import run_study
 
     run_study(a.study, a.output or Path("out") / a.study.stem, retry=a.retry)
 
 
 def campaign(a: Namespace) -> None:
+    log.info(f"campaign: {a.campaign}; finite elements are loaded")
     from pneunet.hifi.runs.campaign.campaign import run_campaign
 
     run_campaign(a.campaign, a.output or Path("out") / a.campaign.stem, retry=a.retry, extend=a.extend)
@@ -107,6 +119,12 @@ def report(a: Namespace) -> None:
     write(a.directory, a.law)
 
 
+def compare(a: Namespace) -> None:
+    from pneunet.design.measured.comparison import run_compare
+
+    run_compare(a.run, a.measured, a.output, a.markers, a.fit_wall, a.as_is, a.law)
+
+
 def fit_material(a: Namespace) -> None:
     from pneunet.base.materials.fit_run import run_fit
 
@@ -130,6 +148,7 @@ COMMANDS = {
     "shape": shape,
     "workspace": workspace,
     "mesh": mesh,
+    "export": export,
     "solve": solve,
     "cell": cell,
     "study": study,
@@ -137,6 +156,7 @@ COMMANDS = {
     "suggest": suggest,
     "train": train,
     "report": report,
+    "compare": compare,
     "fit-material": fit_material,
     "run": run,
     "doctor": doctor,

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.toml import from_table
 from pneunet.base.materials.laws import Hyperelastic, material_from_table
 from pneunet.base.units import each_in_MPa
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.report import write_report
+from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import Manipulator, Segment
@@ -60,9 +62,12 @@ def predict(
 
     pressure_kPa: one for all, or one for each group of segments. law: 'trained', 'analytic', a law's file
     (.npz) or a SegmentLaw. InputError where a pressure or their number is wrong, ConvergenceError where the
-    law has no equilibrium.
+    law has no equilibrium. What makes the law doubt its answer is logged.
     """
-    return prediction.predict(manipulator, each_in_MPa(pressure_kPa), chosen_law(law), base_pose=base_pose)
+    law, pressure = chosen_law(law), each_in_MPa(pressure_kPa)
+    line = prediction.predict(manipulator, pressure, law, base_pose=_pose(base_pose))
+    tell_doubts(prediction.doubts(manipulator, [pressure], law), law, WARN)
+    return line
 
 
 def rod(
@@ -78,7 +83,17 @@ def rod(
     pressure_kPa: one for all, or one for each group of segments. InputError where a pressure or their number
     is wrong.
     """
-    return Rod.of(manipulator, chosen_law(law), each_in_MPa(pressure_kPa), base_pose)
+    return Rod.of(manipulator, chosen_law(law), each_in_MPa(pressure_kPa), _pose(base_pose))
+
+
+def _pose(given):
+    """A base's frame (4, 4), or None; InputError for anything else."""
+    pose = np.eye(4) if given is None else np.asarray(given)
+    finite = pose.shape == (4, 4) and pose.dtype.kind in "fi" and np.isfinite(pose).all()
+    R = pose[:3, :3] if finite else np.zeros((3, 3))
+    if abs(R.T @ R - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0 or (pose[3] != [0, 0, 0, 1]).any():
+        raise InputError("base_pose must be (4, 4): a rotation, an origin in mm, and a last row 0, 0, 0, 1")
+    return given
 
 
 def report(directory: str | Path, law: str | SegmentLaw | None = None) -> Path:

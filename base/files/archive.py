@@ -51,13 +51,14 @@ class Member:
         """InputError for values that are not allowed."""
         if self.kinds == "b":
             return
-        below = _size(self.below, sizes)
-        good = (values >= self.low) & (values < below)
+        # numpy 2 would round bare limits to the array's own precision, in which they may be infinite
+        low, below = np.float64(self.low), np.float64(_size(self.below, sizes))
+        good = (values >= low) & (values < below)
         if self.gaps:
             good |= ~np.isfinite(values)
         if not good.all():
             bad = values[~good].flat[0]
-            raise InputError(f"holds {bad:g}, where numbers in {self.low:g}..{below:g} are wanted")
+            raise InputError(f"holds {bad:g}, where numbers in {low:g}..{below:g} are wanted")
 
 
 def _size(wanted: Any, sizes: Mapping[str, int]) -> Any:

@@ -67,6 +67,7 @@ def _fit(path, law, directory, stress_unit, largest_strain, gauge_length):
         "source": f"pneunet fit-material {path.name}: uniaxial to stretch {tests.largest:.3g}",
     }
     fits, refused = {}, {}
+    log.info(f"{path.name}: fitting {', '.join(LAWS)}")
     for name in LAWS:
         try:
             fits[name] = fit(name, tests, **common)

@@ -7,6 +7,7 @@ here and a name in LAWS.
 """
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -51,7 +52,7 @@ class Arrays:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperelastic(Checked):
+class Hyperelastic(Checked, ABC):
     """What every law has beside its own parameters; those come first, in order of the law's formula.
 
     A law says its `energy`, `law`, its name in files, `stiffness`, its shear modulus in words, and `mu`, that
@@ -82,10 +83,10 @@ class Hyperelastic(Checked):
         def mu(self) -> float:
             """Shear modulus at rest, MPa."""
 
+    @abstractmethod
     def energy(self, I1: Any, I2: Any, operators: Any) -> Any:
         """W (MPa) of the invariants: arrays with the operators ln, sqrt and exp of `Arrays`, or UFL's symbols
         with those of ufl, the parameters being symbols too."""
-        raise NotImplementedError
 
     def of_stretches(self, stretches: np.ndarray) -> np.ndarray:
         """W (...,) in MPa of principal stretches (..., 3) whose product is 1, real or complex."""
@@ -95,8 +96,8 @@ class Hyperelastic(Checked):
     @classmethod
     def fit_range(cls, name: str, largest: float) -> tuple[float, float]:
         """(low, high), positive, between which a parameter that is no modulus is fitted to tests that reach
-        the stretch `largest`."""
-        raise NotImplementedError
+        the stretch `largest`; a law with such parameters must say it."""
+        raise TypeError(f"{cls.__name__} has no fit_range, which says where to look for {name}")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -4,7 +4,7 @@ bar.
 pyvista and matplotlib are imported inside the functions: without them everything else works.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,8 @@ import numpy as np
 from pneunet.base.files.atomic import atomic_path, write_text
 
 PIXELS = (900, 720)
+#: points (n, 3) in mm and matplotlib's keywords of a curve that is drawn in front of all bodies
+Overlay = tuple[np.ndarray, dict]
 
 
 def camera_angles(points: np.ndarray) -> tuple[float, float]:
@@ -64,6 +66,11 @@ class View:
     @property
     def millimetres_per_pixel(self) -> float:
         return 2 * self.half_height / PIXELS[1]
+
+    def pixels(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) columns and rows of points (n, 3) in an image of PIXELS."""
+        image = (np.asarray(points) - self.focus) @ np.column_stack([self.right, -self.up])
+        return np.array(PIXELS) / 2 - 0.5 + image / self.millimetres_per_pixel
 
 
 def view_of(points: np.ndarray, margin: float = 1.12) -> View:
@@ -127,6 +134,7 @@ def write_picture(
     title: str,
     bar: tuple[str, tuple[float, float], str] | None = None,
     extend: str = "neither",
+    overlays: Sequence[Overlay] = (),
 ) -> None:
     """PNG of a rendered image with a title, a scale in mm, the directions of the axes and, when `bar` =
     (label, limits, cmap) is given, a colour bar; extend: as matplotlib's, the ends beyond which there are
@@ -134,7 +142,7 @@ def write_picture(
     height = 5.95 + (0.85 if bar else 0.0)
     fig = figure(7.0, height)
     picture = 5.6 / height
-    show(fig.add_axes([0, 1 - picture - 0.35 / height, 1, picture]), view, image)
+    show(fig.add_axes([0, 1 - picture - 0.35 / height, 1, picture]), view, image, overlays)
     fig.text(0.02, 1 - 0.09 / height, title, fontsize=15, weight="bold", va="top")
     if bar:
         from matplotlib.cm import ScalarMappable
@@ -150,18 +158,26 @@ def write_picture(
     save(fig, path, dpi=100)
 
 
-def show(ax: Any, view: View, image: np.ndarray) -> None:
+def show(ax: Any, view: View, image: np.ndarray, overlays: Sequence[Overlay] = ()) -> None:
     """A rendered image in matplotlib axes, with scale and directions."""
+    from matplotlib.patheffects import withStroke
+
     ax.imshow(image)
     ax.set_axis_off()
+    for points, style in overlays:
+        ax.plot(*view.pixels(points).T, **style, path_effects=[withStroke(linewidth=4.5, foreground="white")])
     _scale_bar(ax, view)
     _triad(ax, view)
 
 
-def _scale_bar(ax, view):
-    wanted = 0.2 * PIXELS[0] * view.millimetres_per_pixel
+def round_length(wanted: float) -> float:
+    """1, 2 or 5 times a power of ten, at most what is wanted."""
     decade = 10 ** np.floor(np.log10(wanted))
-    length = decade * max(n for n in (1, 2, 5) if n * decade <= wanted)
+    return float(decade * max(n for n in (1, 2, 5) if n * decade <= wanted))
+
+
+def _scale_bar(ax, view):
+    length = round_length(0.2 * PIXELS[0] * view.millimetres_per_pixel)
     pixels = length / view.millimetres_per_pixel
     x, y = PIXELS[0] - 30, PIXELS[1] - 22
     ax.plot([x - pixels, x], [y, y], color="black", linewidth=2.2, solid_capstyle="butt")

@@ -47,10 +47,10 @@ def arrays(path):
     from pneunet.geometry.meshfile import read_mesh
 
     mesh, _ = read_mesh(path)
-    found = {"points": mesh.points, "tets": mesh.tetrahedra}
+    found = {"points": mesh.points, "tets": mesh.cells}
     for name, tag in (("base", tags.BASE), ("cavity", tags.CAVITY), ("channel", tags.CHANNEL)):
-        found[name] = owners(mesh.tetrahedra, mesh.tagged(tag))
-    assert len(np.unique(mesh.tetrahedra)) == len(mesh.points)
+        found[name] = owners(mesh.cells, mesh.tagged(tag))
+    assert len(np.unique(mesh.cells)) == len(mesh.points)
     return found | rules()
 
 

@@ -1,6 +1,7 @@
 """Bodies to render: the reduced model's, the finite elements', curves as tubes (base.pictures.rendering makes
 pictures of them)."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -12,9 +13,11 @@ from pneunet.base import se3
 from pneunet.base.errors import InputError
 from pneunet.base.files.reading import open_file
 from pneunet.base.files.text import read_text
-from pneunet.base.pictures.rendering import edges
+from pneunet.base.pictures.rendering import View, edges, view_of
 from pneunet.base.pictures.walls import FIELD
-from pneunet.design.report.labels import TARGET, segment_colour
+from pneunet.design.report.comparison import Comparison
+from pneunet.design.report.labels import TARGET, rgb, segment_colour
+from pneunet.design.report.rundata import DesignFolder
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.rod.laws import SegmentLaw
 
@@ -48,12 +51,10 @@ def body_mesh(
 
 def painted(mesh: "PolyData") -> list[tuple["PolyData", dict]]:
     """A body in the colours of its segments, with its sharp edges, as things to render."""
-    from matplotlib.colors import to_rgb
-
     mesh = mesh.copy()
     segments = np.asarray(mesh.cell_data["segment"]) - 1
-    colours = np.array([to_rgb(segment_colour(i)) for i in range(segments.max() + 1)])
-    mesh.cell_data["colour"] = (255 * colours[segments]).astype(np.uint8)
+    colours = np.array([rgb(segment_colour(i)) for i in range(segments.max() + 1)], np.uint8)
+    mesh.cell_data["colour"] = colours[segments]
     return [(mesh, {"scalars": "colour", "rgb": True, "preference": "cell"}), edges(mesh)]
 
 
@@ -101,6 +102,34 @@ def _read_grid(path):
         raise
     except Exception as error:  # the reader's are of many types
         raise InputError(f"{path}: is damaged ({error})") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The bodies of a report, in target coordinates, and the view that holds them and the target.
+
+    reduced: at the last pressure of the finite elements, without them at the design's. rest: at none. solved:
+    `deformed_surface`. None for what there is not.
+    """
+
+    reduced: "PolyData | None"
+    rest: "PolyData"
+    solved: "tuple[PolyData, tuple[PolyData, dict]] | None"
+    view: View
+
+    @classmethod
+    def of(cls, run: DesignFolder, comparison: Comparison, law: SegmentLaw) -> "Scene":
+        """Of a folder, whose fields are sound, and of what was compared there."""
+        design, solve, reduced, solved = run.design, run.solve, None, None
+        pressure = design.pressure if solve is None else design.scaled(solve.pressure)
+        if (comparison.reduced if solve is None else comparison.reduced_at_solve) is not None:
+            reduced = body_mesh(design.manipulator, pressure, law, design.base_pose)
+        if solve is not None and solve.solution is not None:
+            solved = deformed_surface(read_solution(solve.solution), design.base_pose)
+        rest = body_mesh(design.manipulator, 0.0, law, design.base_pose)
+        held = [body.points for body in (reduced, solved and solved[0]) if body is not None]
+        held += [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
+        return cls(reduced, rest, solved, view_of(np.vstack(held or [rest.points])))
 
 
 def facing_walls(surface: "PolyData") -> "PolyData | None":

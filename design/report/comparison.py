@@ -7,16 +7,21 @@ from scipy.interpolate import CubicSpline
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError
+from pneunet.base.materials.laws import NeoHookean
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.design.report.labels import kPa, plain
+from pneunet.design.report.labels import kPa, plain, significant
 from pneunet.design.report.rundata import DesignFolder
 from pneunet.design.target.metrics import Errors, compare
+from pneunet.geometry.designfile import DesignFile
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
 
-# what the words of the verdict mean, in % of length (RMS of points paired by arc length)
-CONFIRMS, ROUGHLY = 2.0, 5.0
+#: how far prediction and finite elements may be apart before the verdict looks for a cause: % of length (RMS
+#: of points paired by arc length), % of the largest |k| of a segment
+POSITION_BAR, STRAIN_BAR = 2.0, 5.0
+#: mm; the law was learned on such meshes
+USUAL_MESH = DesignFile.mesh_size
 
 
 @dataclass(frozen=True)
@@ -183,27 +188,29 @@ def verdict(run: DesignFolder, comparison: "Comparison") -> str:
         promise = f"for {wanted} the reduced model promises the target within {_mm(c.reduced_target)}"
     if solve is None:
         if promise:
-            return f"F{promise[1:]}; no finite element solution confirms it yet."
+            return f"F{promise[1:]}; there is no finite element solution to compare it with yet."
         return "There is neither a target nor a finite element solution to judge the prediction by."
     pressure = kPa(run.design.scaled(solve.pressure))
     if c.reduced_solved is None:
         sentence = f"At {pressure} the finite element solution has no reduced prediction to be compared with"
     else:
-        percent = c.reduced_solved.percent(c.reduced_solved.rms)
-        word = (
-            "confirms" if percent <= CONFIRMS else "roughly confirms" if percent <= ROUGHLY else "contradicts"
-        )
-        if overlaps(run):
-            word = "is no test of"
+        away = _strain_difference(run, c)
+        bars = f"; bar {POSITION_BAR:g} %", f" (bar {STRAIN_BAR:g} %)"
+        position_bar, strain_bar = ("", "") if overlaps(run) else bars
         sentence = (
-            f"At {pressure} the finite element solution of the whole manipulator {word} the reduced"
-            f" prediction: they differ by {_mm(c.reduced_solved)}, and |k| of a segment by up to"
-            f" {_strain_difference(run, c):.0f} %"
+            f"At {pressure} the finite element solution of the whole manipulator and the reduced prediction"
+            f" differ by {_mm(c.reduced_solved, position_bar)}, and |k| of a segment by up to"
+            f" {significant(away, 2)} %{strain_bar}"
         )
+        beyond = c.reduced_solved.percent(c.reduced_solved.rms) > POSITION_BAR or away > STRAIN_BAR
+        if beyond and not overlaps(run):
+            sentence += f". Beyond the bar; possible causes: {_causes(run)}"
     if promise:
-        sentence += f"; {promise}; at {pressure} the finite element body misses it by {_mm(c.solved_target)}"
+        sentence += (
+            f". F{promise[1:]}; at {pressure} the finite element body misses it by {_mm(c.solved_target)}"
+        )
     elif c.solved_target:
-        sentence += f"; the finite element body misses the target by {_mm(c.solved_target)}"
+        sentence += f". The finite element body misses the target by {_mm(c.solved_target)}"
     if stopped_short(run):
         asked = solve.record.get("pressure_kPa", np.inf) / KPA_PER_MPA
         reason = "stopped short of"
@@ -211,7 +218,7 @@ def verdict(run: DesignFolder, comparison: "Comparison") -> str:
             reason = "ends below"
         elif asked < run.design.largest_pressure * (1 - 1e-6):
             reason = "was asked for less than"
-        sentence += f"; it {reason} the design pressure, {wanted}"
+        sentence += f"; the solution {reason} the design pressure, {wanted}"
     if c.nearest and c.nearest[0] < solve.pressure:
         at = kPa(run.design.scaled(c.nearest[0]))
         sentence += f". Its step nearest to the target is at {at}, with {_mm(c.nearest[1])}"
@@ -230,5 +237,17 @@ def _strain_difference(run, comparison):
     return 100 * float(away / np.linalg.norm(solved, axis=1).max())
 
 
-def _mm(errors):
-    return f"{errors.rms:.2f} mm RMS ({errors.percent(errors.rms):.1f} % of length)"
+def _causes(run):
+    """What, beside the reduced model itself, may have set prediction and finite elements apart."""
+    size = run.solve.record.get("mesh_size_mm") or run.design.mesh_size
+    coarse = size > USUAL_MESH
+    causes = [f"{'a coarse mesh' if coarse else 'the mesh'} ({size:g} mm; solve on a finer one to see)"]
+    others = sorted({m.law for m in run.design.manipulator.materials} - {NeoHookean.law})
+    if others:
+        causes.append(f"a material that the reduced model does not know ({', '.join(others)})")
+    return ", ".join(causes)
+
+
+def _mm(errors, bar=""):
+    percent = significant(errors.percent(errors.rms), 2)
+    return f"{significant(errors.rms, 2)} mm RMS ({percent} % of length{bar})"

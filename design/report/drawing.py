@@ -4,12 +4,15 @@ segments."""
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pneunet.base.files.atomic import atomic_path
 from pneunet.design.report.dimensions import INK, SheetView
 from pneunet.design.report.labels import REDUCED, kPa, plain, segment_colour, segment_mode
 from pneunet.design.report.section_views import cross_section, normal_section, section_groups, section_scale
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
+from pneunet.geometry.sections import whole_section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,43 +28,50 @@ def segment_table(manipulator: Manipulator) -> list[tuple[str, list[str]]]:
     """Rows (label, [text for every segment]) of all dimensions, lengths in mm, for the drawing and the
     report."""
 
-    def row(label, value):
-        return label, [value(s) for s in manipulator.segments]
+    def row(label, value, passive=False):
+        return label, [value(s) if s.chambers or passive else "-" for s in manipulator.segments]
 
     layers = [
         row(
             "stiff layer, bottom of the base",
             lambda s: plain(s.layer_thickness) if s.layer_thickness else "-",
+            True,
         ),
-        row("its material", lambda s: s.layer_material.name if s.layer_thickness else "-"),
+        row("its material", lambda s: s.layer_material.name if s.layer_thickness else "-", True),
     ]
+    rolls = [row("roll about the axis, deg", lambda s: f"{s.roll}", True)]
+    groups = [row("pressure group", lambda s: f"{s.group}", True)]
     return [
-        row("mode", segment_mode),
+        row("mode", segment_mode, True),
         row("angle to the axis, deg", lambda s: plain(s.angle)),
         row(
             "chambers",
             lambda s: f"{s.chambers} pair{'s' * (s.chambers > 1)}" if s.kind == TWISTING else f"{s.chambers}",
         ),
         row("axial pitch", lambda s: plain(s.pitch)),
-        row("width", lambda s: plain(s.width)),
+        row("width", lambda s: plain(s.width), True),
         row("chamber height (cavity)", lambda s: plain(s.chamber_height)),
         row("cavity thickness, normal", lambda s: plain(s.cavity_thickness)),
         row("wall, normal", lambda s: plain(s.wall)),
         row("gap, normal", lambda s: plain(s.gap)),
         row("top wall", lambda s: plain(s.top_wall)),
         row("side wall", lambda s: plain(s.side_wall)),
-        row("base thickness", lambda s: "-" if s.kind == TWISTING else plain(s.base_thickness)),
-        row("roof over the channel", lambda s: plain(s.roof)),
-        row("core thickness", lambda s: plain(s.core_top - s.core_bottom)),
-        row("channel, width x height", lambda s: f"{plain(s.channel_width)} x {plain(s.channel_height)}"),
+        row("base thickness", lambda s: "-" if s.kind == TWISTING else plain(s.base_thickness), True),
+        row("roof over the channel", lambda s: plain(s.roof), True),
+        row("core thickness", lambda s: plain(s.core_top - s.core_bottom), True),
+        row(
+            "channel, width x height", lambda s: f"{plain(s.channel_width)} x {plain(s.channel_height)}", True
+        ),
         row("cavity floor above the axis", lambda s: plain(s.cavity_floor)),
         row("bare core beyond the chambers", lambda s: plain(s.end_margin)),
         row("passive length, each end", lambda s: plain(s.end_length)),
         row("active length", lambda s: plain(s.active_length)),
-        row("length", lambda s: plain(s.length)),
-        row("material", lambda s: s.material.name),
-        row("shear modulus, MPa", lambda s: plain(s.material.mu, 4)),
+        row("length", lambda s: plain(s.length), True),
+        row("material", lambda s: s.material.name, True),
+        row("shear modulus, MPa", lambda s: plain(s.material.mu, 4), True),
         *(layers if any(s.layer_thickness for s in manipulator.segments) else []),
+        *(rolls if any(s.roll for s in manipulator.segments) else []),
+        *(groups if len(manipulator.groups) > 1 else []),
     ]
 
 
@@ -93,11 +103,16 @@ def drawing_figure(design: DesignFile) -> "Figure":
     groups = section_groups(manipulator)
     rows = segment_table(manipulator)
     scale = min((SHEET_WIDTH - 2 * MARGIN - 1.7) / manipulator.length, 0.16)
-    plan_height = scale * max(s.width for s in manipulator.segments) + 1.9
-    highest = max(s.chamber_top for s in manipulator.segments)
-    lowest = min(s.chamber_bottom for s in manipulator.segments)
+    (near, far), (lowest, highest) = _extent(manipulator)
+    plan_height = scale * (far - near) + 1.9
     side_height = scale * (highest - lowest) + 1.7
-    panel_rows = -(-(2 * len(groups) + 2) // COLUMNS)
+    panels = [
+        (draw, group)
+        for group in groups
+        for draw in (cross_section, normal_section)[: 1 + bool(manipulator.segments[group[0]].chambers)]
+    ]
+    place = len(panels) + (len(panels) % COLUMNS == COLUMNS - 1)  # of the table, as wide as two
+    panel_rows = -(-(place + 2) // COLUMNS)
     height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
     figure = Figure(figsize=(SHEET_WIDTH, height), facecolor="white")
     _frame(figure, design, height)
@@ -106,19 +121,19 @@ def drawing_figure(design: DesignFile) -> "Figure":
     width = SHEET_WIDTH - 2 * MARGIN
     middle = manipulator.length / 2
     top -= plan_height
-    _plan(SheetView(figure, (MARGIN, top, width, plan_height), scale, middle, 0.0, up=-0.4), manipulator)
+    rectangle = (MARGIN, top, width, plan_height)
+    _plan(SheetView(figure, rectangle, scale, middle, (near + far) / 2, up=-0.4), manipulator)
     top -= side_height
     rectangle = (MARGIN, top, width, side_height)
     _side(SheetView(figure, rectangle, scale, middle, (highest + lowest) / 2, up=0.48), manipulator)
 
-    panels = [(draw, group) for group in groups for draw in (cross_section, normal_section)]
     panel_scale = min(section_scale(manipulator.segments[g[0]], PANEL_WIDTH, PANEL_HEIGHT) for g in groups)
     for number, (draw, group) in enumerate(panels):
         left = MARGIN + PANEL_WIDTH * (number % COLUMNS)
         bottom = top - PANEL_HEIGHT * (number // COLUMNS + 1)
         draw(figure, (left, bottom, PANEL_WIDTH, PANEL_HEIGHT), panel_scale, manipulator, group)
-    left = MARGIN + PANEL_WIDTH * (len(panels) % COLUMNS)
-    bottom = top - PANEL_HEIGHT * (len(panels) // COLUMNS + 1)
+    left = MARGIN + PANEL_WIDTH * (place % COLUMNS)
+    bottom = top - PANEL_HEIGHT * (place // COLUMNS + 1)
     _table(figure, (left + 0.1, bottom + 0.1, 2 * PANEL_WIDTH - 0.2, PANEL_HEIGHT - 0.2), rows)
     return figure
 
@@ -145,45 +160,111 @@ def _frame(figure, design, height):
     )
     notes = (
         f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The'
-        " lower chambers of a twisting segment are the upper ones turned by half a turn about x. One cavity:"
-        " the channel joins all chambers."
+        f" lower chambers of a twisting segment are the upper ones turned by half a turn about x.\n"
+        f"{_cavities(manipulator)} Sections are in a segment's own axes, before its roll."
     )
     figure.text(x, (MARGIN + 0.42) / height, notes, fontsize=8.5, color=INK, va="top", linespacing=1.4)
 
 
+def _cavities(manipulator):
+    """What the channel joins, and where the air comes in."""
+    ports = ", ".join(plain(x) for x in manipulator.ports)
+    if len(manipulator.groups) == 1:
+        return f"One cavity: the channel joins all chambers. Port at x = {ports}, from the -y side, z = 0."
+    walls = manipulator.channels[1:, 0] - manipulator.channels[:-1, 1]
+    return (
+        f"{len(manipulator.groups)} cavities, one a pressure group, with bulkheads of"
+        f" {', '.join(plain(w) for w in walls)} between them. Ports at x = {ports}, from their segments' -y"
+        " side, z = 0."
+    )
+
+
+def _extent(manipulator):
+    """(2, 2) lowest and highest y and z of the body, mm."""
+    sections = np.array([whole_section(s) for s in manipulator.segments])
+    return np.column_stack([sections[..., 0].min(axis=0), sections[..., 1].max(axis=0)])
+
+
+#: roll -> which of a segment's own axes is up on the sheet, with which sign, and from which side of the other
+#: it is seen
+FROM_ABOVE = {0: ("y", 1, 1), 90: ("z", -1, 1), 180: ("y", -1, -1), 270: ("z", 1, -1)}
+FROM_THE_SIDE = {0: ("z", 1, -1), 90: ("y", 1, 1), 180: ("z", -1, 1), 270: ("y", -1, -1)}
+
+
+def _bodies(view, manipulator, seen):
+    """Core, chambers and channel of every segment, as `seen` says: FROM_ABOVE or FROM_THE_SIDE."""
+    for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
+        axis, sign, near = seen[s.roll]
+        draw = _along_height if axis == "y" else _along_width
+        draw(view, s, start, segment_colour(i), sign, near)
+        first, last = manipulator.channels[s.group - 1]
+        x0, x1 = max(start, first), min(start + s.length, last)
+        half = (s.channel_width if axis == "y" else s.channel_height) / 2
+        if axis == "y":
+            for y in (-half, half):
+                view.line([(x0, y), (x1, y)], width=0.6, style=(0, (5, 2)))
+            for x in {x0, x1} & {first, last}:
+                view.line([(x, -half), (x, half)], width=0.6, style=(0, (5, 2)))
+
+
+def _along_height(view, s, start, colour, sign, near):
+    """Seen along the segment's z: the chambers of side `near` solid, others dashed."""
+    half = s.width / 2
+    view.polygon(_box(start, s.length, -half, half), face="#f1f3f5")
+    for side in sorted(s.sides, key=lambda side: side == near):
+        for x in start + s.chamber_positions:
+            outline, cavity = (
+                [(x, sign * y) for x, y in chamber_plan(s, x, thickness, width, side)]
+                for thickness, width in (
+                    (s.chamber_thickness, half),
+                    (s.cavity_thickness, s.cavity_width / 2),
+                )
+            )
+            if side == near:
+                view.polygon(outline, face=colour, width=0.8)
+                view.polygon(cavity, face="white", width=0.5, alpha=0.55)
+            else:
+                view.polygon(outline, face="none", width=0.6, style=(0, (3, 2)))
+
+
+def _along_width(view, s, start, colour, sign, near):
+    """Seen along the segment's y: the end faces of the chambers at the side `near` dark, their slanted sides
+    behind them light."""
+    for side in s.sides:
+        z0, z1 = side * sign * s.core_top, side * sign * s.chamber_top
+        for shade, width in ((0.35, None), (1.0, 0.7)):
+            for x in start + s.chamber_positions:
+                corners = [c[0] for c in chamber_plan(s, x, s.chamber_thickness, s.width / 2, side)]
+                faces = corners[:2] if near < 0 else corners[:1:-1]
+                x0, x1 = (min(corners), max(corners)) if width is None else faces
+                view.polygon(
+                    [(x0, z0), (x1, z0), (x1, z1), (x0, z1)], face=colour, width=width or 0.4, alpha=shade
+                )
+    view.polygon(_box(start, s.length, sign * s.core_bottom, sign * s.core_top), face="#e4e8ec", width=0.9)
+
+
+def _box(start, length, low, high):
+    return [(start, low), (start + length, low), (start + length, high), (start, high)]
+
+
 def _plan(view, manipulator):
     """Seen from above: upper chambers solid, lower ones and the channel dashed."""
-    start_of_channel = manipulator.segments[0].chamber_positions[0]
-    end_of_channel = manipulator.starts[-1] + manipulator.segments[-1].chamber_positions[-1]
     short = min(s.length for s in manipulator.segments) * view.scale < 1.5
-    highest = max(s.width for s in manipulator.segments) / 2
+    highest = _extent(manipulator)[0, 1]
     view.title(-view.mm(0.28), view.mm(0.3), "plan")
+    _bodies(view, manipulator, FROM_ABOVE)
     for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
-        half = s.width / 2
-        view.polygon(
-            [(start, -half), (start + s.length, -half), (start + s.length, half), (start, half)],
-            face="#f1f3f5",
-        )
-        for side in reversed(s.sides):
-            for x in start + s.chamber_positions:
-                outline = chamber_plan(s, x, s.chamber_thickness, half, side)
-                cavity = chamber_plan(s, x, s.cavity_thickness, s.cavity_width / 2, side)
-                if side > 0:
-                    view.polygon(outline, face=segment_colour(i), width=0.8)
-                    view.polygon(cavity, face="white", width=0.5, alpha=0.55)
-                else:
-                    view.polygon(outline, face="none", width=0.6, style=(0, (3, 2)))
-        x0, x1 = max(start, start_of_channel), min(start + s.length, end_of_channel)
-        for y in (-s.channel_width / 2, s.channel_width / 2):
-            view.line([(x0, y), (x1, y)], width=0.6, style=(0, (5, 2)))
-        first = start + s.chamber_positions[0]
-        view.angle(first + half * s.cot, half, s.angle, 0.42)
+        half, (axis, sign, _) = s.width / 2, FROM_ABOVE[s.roll]
         level = highest + view.mm(0.92 + (0.3 if short and i % 2 else 0.0))
-        view.balloon(
-            start + s.length / 2, level, i + 1, f"{segment_mode(s)} {plain(s.angle)}°", segment_colour(i)
-        )
+        told = f"{segment_mode(s)} {plain(s.angle)}°" if s.chambers else segment_mode(s)
+        told += f", rolled {s.roll}°" * bool(s.roll)
+        view.balloon(start + s.length / 2, level, i + 1, told, segment_colour(i))
+        if not s.chambers or axis == "z":
+            continue
+        first, slant = start + s.chamber_positions[0], half * s.cot
+        view.angle(first + sign * slant, half, s.angle if sign > 0 else 180 - s.angle, 0.42)
         if s.chambers > 1:
-            x = first - half * s.cot
+            x = first - sign * slant
             view.horizontal(x, x + s.pitch, -half, -half - view.mm(0.3), f"pitch {plain(s.pitch)}")
     _axis(view, manipulator)
     view.text(-view.mm(0.28), 0, "base", ha="right")
@@ -196,40 +277,23 @@ def _axis(view, manipulator):
 
 
 def _side(view, manipulator):
-    """Seen along y: the near end faces of the chambers dark, their slanted sides behind them light."""
+    """Seen along y, from where y is negative."""
     view.title(-view.mm(0.28), view.mm(0.3), "side view")
+    _bodies(view, manipulator, FROM_THE_SIDE)
     ends, lengths = [], []
-    for i, (s, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
-        for side in s.sides:
-            z0, z1 = side * s.core_top, side * s.chamber_top
-            for shade, width in ((0.35, None), (1.0, 0.7)):
-                for x in start + s.chamber_positions:
-                    corners = [c[0] for c in chamber_plan(s, x, s.chamber_thickness, s.width / 2, side)]
-                    x0, x1 = (min(corners), max(corners)) if width is None else (corners[0], corners[1])
-                    view.polygon(
-                        [(x0, z0), (x1, z0), (x1, z1), (x0, z1)],
-                        face=segment_colour(i),
-                        width=width or 0.4,
-                        alpha=shade,
-                    )
-        view.polygon(
-            [
-                (start, s.core_bottom),
-                (start + s.length, s.core_bottom),
-                (start + s.length, s.core_top),
-                (start, s.core_top),
-            ],
-            face="#e4e8ec",
-            width=0.9,
-        )
+    for s, start in zip(manipulator.segments, manipulator.starts):
         a, b = start + s.end_length, start + s.end_length + s.active_length
-        ends += [(start, a, plain(s.end_length)), (b, start + s.length, plain(s.end_length))]
-        lengths.append((start, start + s.length, plain(s.length), (a, b, plain(s.active_length))))
+        if s.chambers:
+            ends += [(start, a, plain(s.end_length)), (b, start + s.length, plain(s.end_length))]
+        else:
+            ends.append((start, start + s.length, plain(s.length)))
+        lengths.append((start, start + s.length, plain(s.length), (a, b, s)))
     _axis(view, manipulator)
-    low = min(s.chamber_bottom for s in manipulator.segments)
+    low = _extent(manipulator)[1, 0]
     view.chain_below(ends, low, low - view.mm(0.25))
-    for start, stop, text, (a, b, active) in lengths:
-        view.between(a, b, low - view.mm(0.25), active)
+    for start, stop, text, (a, b, s) in lengths:
+        if s.chambers:
+            view.between(a, b, low - view.mm(0.25), plain(s.active_length))
         view.horizontal(start, stop, low, low - view.mm(0.68), text)
     view.horizontal(
         0.0, manipulator.length, low, low - view.mm(0.98), f"total length {plain(manipulator.length)}"

@@ -7,18 +7,29 @@ import numpy as np
 from pneunet.base.errors import ConvergenceError
 from pneunet.base.pictures import rendering
 from pneunet.base.pictures.rendering import figure, save
-from pneunet.base.pictures.walls import TOUCHING, draw_walls
+from pneunet.base.pictures.walls import EVENLY_LIT, TOUCHING, draw_walls
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.design.report import bodies
+from pneunet.design.report.bodies import Scene
 from pneunet.design.report.comparison import Comparison
 from pneunet.design.report.drawing import chamber_plan
-from pneunet.design.report.labels import FINITE_ELEMENTS, kPa, segment_colour
+from pneunet.design.report.labels import FINITE_ELEMENTS, STYLES, kPa, segment_colour, significant
 from pneunet.design.report.pictures import curve_panels, legend, segment_bands
 from pneunet.design.report.rundata import DesignFolder, Solution
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced import predict
 from pneunet.reduced.rod.laws import SegmentLaw
+
+#: point data of the elements around a node (hifi.runs.solve.fields)
+MEAN_STRETCH = "mean_stretch"
+#: file, point data, in words, unit, percentile at which the scale ends: corners are singular for the stretch
+FIELDS = (
+    ("fe_displacement.png", "displacement length", "displacement", " mm", 100),
+    ("fe_stretch.png", MEAN_STRETCH, "mean principal stretch", "", 98),
+)
+#: tells most values apart, where most of a body is stretched little
+MAP = "turbo"
 
 
 def _at(design, solve):
@@ -50,81 +61,66 @@ def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> 
     return [("curves.png", f"Centrelines in 3D and in two projections, equal scale{coloured}.")]
 
 
-def body_pictures(
-    run: DesignFolder, comparison: "Comparison", law: SegmentLaw, folder: Path
-) -> list[tuple[str, str]]:
-    """Target, reduced body, finite element body and the reference body from one camera at one scale; fields
-    on the finite element body."""
-    design, solve = run.design, run.solve
-    pressure = design.pressure if solve is None else design.scaled(solve.pressure)
-    reduced = None
-    if (comparison.reduced if solve is None else comparison.reduced_at_solve) is not None:
-        reduced = bodies.body_mesh(design.manipulator, pressure, law, design.base_pose)
-    rest = bodies.body_mesh(design.manipulator, 0.0, law, design.base_pose)
-    solved = None
-    if solve is not None and solve.solution is not None:
-        solved, solved_edges = bodies.deformed_surface(bodies.read_solution(solve.solution), design.base_pose)
-    with_target = [] if run.target is None else [bodies.tube(run.target)]
-    curves = [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
-    held = [m.points for m in (reduced, solved) if m is not None] + curves
-    view = rendering.view_of(np.vstack(held or [rest.points]))
+def body_pictures(run: DesignFolder, scene: Scene, folder: Path) -> list[tuple[str, str]]:
+    """Target, reduced body and finite element body from one camera at one scale; fields on the finite element
+    body; the reference body."""
+    solve = run.solve
+    pressure = run.design.pressure if solve is None else run.design.scaled(solve.pressure)
+    dashed = [] if run.target is None else [(run.target, STYLES["target"] | {"linewidth": 3.0})]
+    with_target = "; dashed in front: the target" * bool(dashed)
     out = []
 
-    def picture(name, things, title, caption, bar=None):
-        rendering.write_picture(folder / name, view, rendering.render(view, things), title, bar)
+    def picture(name, things, title, caption, **more):
+        rendering.write_picture(
+            folder / name, scene.view, rendering.render(scene.view, things), title, **more
+        )
         out.append((name, caption))
 
-    if with_target:
-        picture(
-            "target.png",
-            with_target,
-            "target",
-            "The target curve (black in the other pictures of this row too, where the body does not hide"
-            " it).",
-        )
-    if reduced is not None:
+    if run.target is not None:
+        picture("target.png", [bodies.tube(run.target)], "target", "The target curve.")
+    if scene.reduced is not None:
         picture(
             "reduced.png",
-            bodies.painted(reduced) + with_target,
+            bodies.painted(scene.reduced),
             f"reduced model, {kPa(pressure)}",
-            "The reduced model's body, coloured by segment.",
+            f"The reduced model's body, coloured by segment{with_target}.",
+            overlays=dashed,
         )
-    if solve is not None and solved is not None:
-        plainly = {"color": FINITE_ELEMENTS, "opacity": 1.0}
+    if solve is not None and scene.solved is not None:
+        surface, lines = scene.solved
         picture(
             "fe.png",
-            [(solved, plainly), solved_edges, *with_target],
-            f"finite elements, {_at(design, solve)}",
-            "The finite element body.",
+            [(surface, {"color": FINITE_ELEMENTS}), lines],
+            f"finite elements, {_at(run.design, solve)}",
+            f"The finite element body{with_target}.",
+            overlays=dashed,
         )
-        for name, field, label, cmap in (
-            ("fe_displacement.png", "displacement length", "displacement (mm)", "viridis"),
-            ("fe_stretch.png", "stretch", "largest principal stretch (-)", "YlOrRd"),
-        ):
-            if field not in solved.point_data:
+        for name, field, what, unit, percentile in FIELDS:
+            if field not in surface.point_data:
                 continue
-            values = solved.point_data[field]
-            top = np.percentile(values, 99.5)
-            limits = (float(values.min()), float(max(top, values.min() + 1e-9)))
-            beyond = (
-                f"; 0.5 % of its nodes lie above the scale, up to {values.max():.2f}"
-                if values.max() > 1.01 * top
-                else ""
-            )
-            if field == "stretch":
-                beyond += f"; the largest inside the elements is {solve.steps['largest_stretch'][-1]:.2f}"
+            values = surface.point_data[field]
+            low, top = float(values.min()), float(np.percentile(values, percentile))
+            limits = (low, max(top, low + 1e-9))
+            beyond = values.max() > limits[1]
+            caption = f"Finite element body coloured by {what}, at most {significant(values.max(), 3)}{unit}"
+            caption += f"; the scale ends at the {percentile}th percentile" * bool(beyond)
+            if field == MEAN_STRETCH:
+                inside = significant(solve.steps["largest_stretch"][-1], 3)
+                caption += f". Inside an element it is at most {inside} (largest_stretch in steps.csv)"
+            coloured, look = rendering.coloured(surface, field, limits, MAP)
             picture(
                 name,
-                [rendering.coloured(solved, field, limits, cmap), solved_edges],
-                f"{label.split(' (')[0]}, {_at(design, solve)}",
-                f"Finite element body coloured by {label.split(' (')[0]}{beyond}.",
-                (label, limits, cmap),
+                [(coloured, look | EVENLY_LIT), lines],
+                f"{what}, {_at(run.design, solve)}",
+                f"{caption}.",
+                bar=(f"{what} ({unit.strip() or '-'})", limits, MAP),
+                extend="max" if beyond else "neither",
             )
-    rest_view = rendering.view_of(rest.points)
+    rest_view = rendering.view_of(scene.rest.points)
     rendering.write_picture(
         folder / "reference.png",
         rest_view,
-        rendering.render(rest_view, bodies.painted(rest)),
+        rendering.render(rest_view, bodies.painted(scene.rest)),
         "reference body, 0 kPa",
     )
     out.append(("reference.png", "The body at rest (its own scale)."))
@@ -202,11 +198,13 @@ def history_picture(
     ]
 
 
-def touching_picture(design: DesignFile, solve: Solution, folder: Path) -> list[tuple[str, str]]:
+def touching_picture(
+    design: DesignFile, solve: Solution, scene: Scene, folder: Path
+) -> list[tuple[str, str]]:
     """The deformed body, its facing walls coloured by their distance; [] without fields or gaps."""
-    if solve.solution is None:
+    if scene.solved is None:
         return []
-    surface, (lines, _) = bodies.deformed_surface(bodies.read_solution(solve.solution), design.base_pose)
+    surface, (lines, _) = scene.solved
     walls = bodies.facing_walls(surface)
     if walls is None:
         return []
@@ -214,7 +212,7 @@ def touching_picture(design: DesignFile, solve: Solution, folder: Path) -> list[
     touching = TOUCHING * gap * solve.contact
     around = f"is nearer than {touching:.2g} mm: contact" if touching else "lies behind the other: overlap"
     title = f"distance of walls, {_at(design, solve)}"
-    draw_walls(folder / "fe_walls.png", surface, lines, walls, gap, title, touching)
+    draw_walls(folder / "fe_walls.png", surface, lines, walls, gap, title, touching, scene.view)
     return [
         (
             "fe_walls.png",
@@ -243,7 +241,7 @@ def wall_picture(manipulator: Manipulator, solve: Solution, folder: Path) -> lis
     colours = ScalarMappable(norm, "RdBu")
     half = max(s.width for s in manipulator.segments) / 2
     strip = 9.6 * (2 * half + 3) / manipulator.length
-    height = len(sides) * (strip + 0.45) + 0.95
+    height = len(sides) * (strip + 0.45) + 1.15
     fig = figure(10.6, height)
     for row, side in enumerate(sides):
         ax = fig.add_axes([0.07, 1 - (row + 1) * (strip + 0.45) / height, 0.9, strip / height])
@@ -286,7 +284,8 @@ def wall_picture(manipulator: Manipulator, solve: Solution, folder: Path) -> lis
         ax.set_xlim(-1, manipulator.length + 1)
         ax.set_ylim(-half - 1.5, half + 1.5)
         ax.set_title(
-            "upper chambers" if side > 0 else "lower chambers (seen through the body)",
+            ("upper chambers" if side > 0 else "lower chambers (seen through the body)")
+            + ", each segment as before its roll" * any(s.roll for s in manipulator.segments),
             fontsize=9,
             loc="left",
             pad=7,
@@ -295,18 +294,17 @@ def wall_picture(manipulator: Manipulator, solve: Solution, folder: Path) -> lis
         ax.tick_params(labelsize=8)
         for edge in ("left", "right", "top"):
             ax.spines[edge].set_visible(False)
-    fig.colorbar(
-        colours,
-        cax=fig.add_axes([0.25, 0.45 / height, 0.5, 0.13 / height]),
-        orientation="horizontal",
-        label="smallest distance of the walls facing each other (mm); negative = overlap",
-    )
+    ax.set_xlabel("along the body at rest (mm)", fontsize=9, labelpad=2)
+    cax = fig.add_axes([0.25, 0.45 / height, 0.5, 0.13 / height])
+    fig.colorbar(colours, cax=cax, orientation="horizontal")
+    cax.set_xlabel("smallest distance of the walls facing each other (mm); negative = overlap", fontsize=9)
+    cax.tick_params(labelsize=8)
     save(fig, folder / "walls.png", dpi=110)
     return [
         (
             "walls.png",
             (
-                "Plan of the body at rest (x in mm), gaps coloured by the smallest distance of their walls,"
+                "Plan of the body at rest, gaps coloured by the smallest distance of their walls,"
                 " last step. Red triangles mark overlap."
             ),
         )

@@ -18,6 +18,12 @@ def segment_colour(index: int) -> str:
     return SEGMENT_COLOURS[index % len(SEGMENT_COLOURS)]
 
 
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue from 0 to 255 of '#rrggbb'."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
+
+
 def plain(value: float, decimals: int = 2) -> str:
     """A number without trailing zeros: 2 -> '2', 5.7735 -> '5.77'."""
     text = f"{value:.{decimals}f}"
@@ -38,6 +44,11 @@ def significant(value: float, digits: int = 4) -> str:
         return "0"
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
     return plain(round(value, decimals), max(decimals, 0))
+
+
+def signed(value: float, digits: int = 4) -> str:
+    """`significant` with a plus before what is positive."""
+    return "+" * (value > 0) + significant(value, digits)
 
 
 def segment_mode(segment: Segment) -> str:

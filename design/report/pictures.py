@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pneunet.base.pictures.rendering import camera_angles, figure
-from pneunet.design.report.labels import STYLES, kPa, plain, segment_colour, segment_name, significant
+from pneunet.design.report.labels import STYLES, kPa, plain, segment_colour, segment_name, signed, significant
 from pneunet.design.target.metrics import Errors
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+#: of the place of 3D axes: the rest is for their labels
+FILLED = 0.84
 #: label, points (n, 3) in mm, style of STYLES
 Line = tuple[str, np.ndarray, str]
 #: colour, points (n, 3) in mm: a stretch of a centreline that belongs to a segment
@@ -25,7 +27,8 @@ Band = tuple[str, np.ndarray]
 
 
 def equal_axes_3d(ax: "Axes3D", points: np.ndarray, pad: float = 0.06) -> None:
-    """Limits of 3D axes that hold points (n, 3) at one scale in x, y and z; labels in mm."""
+    """Limits of 3D axes that hold points (n, 3) at one scale in x, y and z, as large as their place allows;
+    labels in mm."""
     from matplotlib.ticker import MaxNLocator
 
     low, high = np.min(points, axis=0), np.max(points, axis=0)
@@ -33,12 +36,26 @@ def equal_axes_3d(ax: "Axes3D", points: np.ndarray, pad: float = 0.06) -> None:
     # a flat curve still gets a box with some depth
     half = np.maximum((high - low) / 2, 0.12 * size) + pad * size
     middle = (low + high) / 2
-    ax.set_box_aspect(tuple(half), zoom=0.95)
+    ax.set_proj_type("ortho")
+    ax.set_box_aspect(tuple(half))
     for i, name in enumerate("xyz"):
         getattr(ax, f"set_{name}lim")(middle[i] - half[i], middle[i] + half[i])
         getattr(ax, f"{name}axis").set_major_locator(MaxNLocator(max(2, round(6 * half[i] / half.max()))))
         getattr(ax, f"set_{name}label")(f"{name} (mm)", labelpad=2 + 6 * half[i] / half.max())
     ax.tick_params(labelsize=8, pad=1)
+    ax.set_box_aspect(tuple(half), zoom=FILLED / _share_filled(ax, middle, half))
+
+
+def _share_filled(ax, middle, half):
+    """Of the place of 3D axes, in the direction in which more of it is taken."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    ax.apply_aspect()
+    corners = middle + half * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
+    x, y, _ = proj_transform(*corners.T, ax.get_proj())
+    taken = np.ptp(ax.transData.transform(np.column_stack([x, y])), axis=0)
+    place = ax.get_position(original=True).transformed(ax.figure.transFigure)
+    return max(taken / [place.width, place.height])
 
 
 def curve_panels(
@@ -53,9 +70,9 @@ def curve_panels(
     ax.view_init(*camera_angles(everything))
     band: dict = {"linewidth": 9, "alpha": 0.75, "solid_capstyle": "butt", "zorder": 1}
     for colour, points in segments:
-        ax.plot(*points.T, color=colour, **band)
+        ax.plot(*points.T, color=colour, clip_on=False, **band)  # its axes are a square in its place
     for label, points, style in curves:
-        ax.plot(*points.T, label=label, **STYLES[style])
+        ax.plot(*points.T, label=label, clip_on=False, **STYLES[style])
     ax.scatter(*curves[0][1][0], color="black", s=22, zorder=5)
     ax.text(*curves[0][1][0], "  base", fontsize=8)
     equal_axes_3d(ax, everything)
@@ -112,14 +129,14 @@ def error_caption(errors: Errors) -> str:
     """The four errors and the length mismatch (`design.target.metrics.Errors`) in two lines."""
 
     def both(mm):
-        return f"{mm:.2f} mm ({errors.percent(mm):.1f} %)"
+        return f"{significant(mm, 2)} mm ({significant(errors.percent(mm), 2)} %)"
 
     return (
         f"RMS paired by arc length {both(errors.rms)},  two-sided Hausdorff {both(errors.hausdorff)},  "
         f"tip {both(errors.tip)}\n"
         f"Eq. 27 sum over {errors.eq27_points} points {significant(errors.eq27)} mm²,  "
         f"length {errors.length:.1f} mm, wanted {errors.reference_length:.1f} mm "
-        f"({errors.percent(errors.length_mismatch):+.1f} %)    [% of the wanted length]"
+        f"({signed(errors.percent(errors.length_mismatch), 2)} %)    [% of the wanted length]"
     )
 
 

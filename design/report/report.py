@@ -14,10 +14,17 @@ from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import revision
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report import figures
-from pneunet.design.report.bodies import read_solution
-from pneunet.design.report.comparison import CONFIRMS, ROUGHLY, Comparison, overlaps, stopped_short, verdict
+from pneunet.design.report.bodies import Scene, read_solution
+from pneunet.design.report.comparison import (
+    POSITION_BAR,
+    STRAIN_BAR,
+    Comparison,
+    overlaps,
+    stopped_short,
+    verdict,
+)
 from pneunet.design.report.drawing import draw_drawing, segment_table
-from pneunet.design.report.labels import kPa, plain, segment_name, significant
+from pneunet.design.report.labels import kPa, plain, segment_name, signed, significant
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.laws import SegmentLaw
@@ -36,6 +43,7 @@ h2 { font-size: 1.2rem; border-bottom: 2px solid #dee2e6; margin-top: 2.2rem; pa
   border-left: 5px solid #c92a2a; background: #fff0f0; color: #861c1c; padding: .7rem 1rem; font-weight: 600;
 }
 .note { border-left: 5px solid #f08c00; background: #fff8eb; padding: .5rem 1rem; margin: .6rem 0; }
+summary { cursor: pointer; padding: .3rem 0; }
 .missing { color: #6b747d; font-style: italic; }
 .table { overflow-x: auto; margin: .8rem 0; }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
@@ -44,7 +52,7 @@ th { background: #f1f3f5; }
 th:first-child, td:first-child { text-align: left; }
 tr.head td { font-weight: 600; background: #f8f9fa; }
 td.long { white-space: normal; text-align: left; word-break: break-word; }
-.grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: .8rem; }
+.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(290px, 1fr)); gap: .8rem; }
 figure { margin: .8rem 0; }
 .grid figure { margin: 0; }
 img { width: 100%; height: auto; border: 1px solid #e4e8ec; }
@@ -76,20 +84,22 @@ def write_report(directory: str | Path, law: SegmentLaw | None = None) -> Path:
 
 def _write(run, law, folder):
     """The path of the page."""
+    log.info(f"report of {run.directory}: curves and bodies")
     comparison = Comparison.of(run, law)
+    scene = Scene.of(run, comparison, law)
     draw_drawing(run.design, folder / "drawing.png")
-    sections = [
-        ("Target, prediction, finite elements", _shapes(run, comparison, law, folder)),
-        ("Errors", _errors(comparison, run)),
-        ("Strains of the segments", _strains(run, comparison)),
-        ("Load history", _history(run, law, folder)),
-        ("Where walls touch", _walls(run, folder)),
-        ("Drawing, dimensions, material", _drawing(run, folder)),
-        ("How it was computed", _computed(run)),
-    ]
-    body = _headline(run, comparison) + "".join(
-        f"<section><h2>{escape(title)}</h2>{content}</section>" for title, content in sections
-    )
+    body = _headline(run, comparison)
+    for title, content in (
+        ("Target, prediction, finite elements", lambda: _shapes(run, comparison, scene, folder)),
+        ("Errors", lambda: _errors(comparison, run)),
+        ("Strains of the segments", lambda: _strains(run, comparison)),
+        ("Load history", lambda: _history(run, law, folder)),
+        ("Where walls touch", lambda: _walls(run, scene, folder)),
+        ("Drawing, dimensions, material", lambda: _drawing(run, folder)),
+        ("How it was computed", lambda: _computed(run)),
+    ):
+        log.info(f"  {title.lower()}")
+        body += f"<section><h2>{escape(title)}</h2>{content()}</section>"
     page = (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -177,8 +187,9 @@ def _headline(run, comparison):
     out += "".join(f'<p class="note">{escape(note)}</p>' for note in c.notes)
     if c.reduced_solved:
         out += (
-            f'<p class="missing">"Confirms" means an RMS distance of at most {CONFIRMS:g} % of length, '
-            f'"roughly" at most {ROUGHLY:g} %, beyond that "contradicts".</p>'
+            '<p class="missing">The bars are conventions of this report: an RMS distance of'
+            f" {POSITION_BAR:g} % of length, a difference of {STRAIN_BAR:g} % of the largest |k| of a"
+            " segment.</p>"
         )
     return out
 
@@ -187,14 +198,14 @@ def _alarms(run):
     return "".join(f'<p class="alarm">OVERLAP, not proven: {escape(text)}.</p>' for text in overlaps(run))
 
 
-def _shapes(run, comparison, law, folder):
+def _shapes(run, comparison, scene, folder):
     out = ""
     if run.solve is None:
         out += _missing("There is no finite element solution in this folder yet (pneunet solve).")
     elif run.solve.solution is None:
         out += _missing("The finite element fields (solve/solution.pvd) are not in this folder.")
     curves = figures.curve_picture(run, comparison, folder)
-    bodies = figures.body_pictures(run, comparison, law, folder)
+    bodies = figures.body_pictures(run, scene, folder)
     fields = [b for b in bodies if b[0] in ("fe_displacement.png", "fe_stretch.png", "reference.png")]
     beside = [b for b in bodies if b not in fields]
     return (
@@ -218,8 +229,8 @@ def _errors(comparison, run):
     if not columns:
         return _missing("There are no two curves to compare.")
 
-    def both(e, mm, sign=""):
-        return f"{mm:{sign}.2f} mm ({e.percent(mm):{sign}.2f} %)"
+    def both(e, mm, told=significant):
+        return f"{told(mm, 3)} mm ({told(e.percent(mm), 2)} %)"
 
     rows = [
         ["RMS, points paired by arc length"] + [both(e, e.rms) for _, e in columns],
@@ -227,7 +238,7 @@ def _errors(comparison, run):
         ["tip distance"] + [both(e, e.tip) for _, e in columns],
         ["Eq. 27 (sum of squared nearest distances)"]
         + [f"{significant(e.eq27)} mm² over {e.eq27_points} points" for _, e in columns],
-        ["length mismatch"] + [both(e, e.length_mismatch, "+") for _, e in columns],
+        ["length mismatch"] + [both(e, e.length_mismatch, signed) for _, e in columns],
         ["lengths"] + [f"{e.length:.2f} mm vs {e.reference_length:.2f} mm" for _, e in columns],
     ]
     return (
@@ -278,7 +289,7 @@ def _history(run, law, folder):
     return "".join(_image(folder, *p) for p in figures.history_picture(run.design, run.solve, law, folder))
 
 
-def _walls(run, folder):
+def _walls(run, scene, folder):
     if run.solve is None:
         return _missing("No wall distances: there is no finite element solution yet.")
     solve = run.solve
@@ -298,9 +309,8 @@ def _walls(run, folder):
         )
     if not distances:
         return out + _missing("No wall distances: the body has no gaps.")
-    pictures = figures.touching_picture(run.design, solve, folder)
-    pictures += figures.wall_picture(run.design.manipulator, solve, folder)
-    out += "".join(_image(folder, *p) for p in pictures)
+    out += _grid(folder, figures.touching_picture(run.design, solve, scene, folder))
+    out += "".join(_image(folder, *p) for p in figures.wall_picture(run.design.manipulator, solve, folder))
     rows = []
     for key in sorted({(a, b) for a, b, _, _ in solve.walls}, key=lambda k: (k[0], -k[1])):
         here = [(d, gap) for a, b, gap, d in solve.walls if (a, b) == key]
@@ -336,19 +346,19 @@ def _drawing(run, folder):
 
 
 def _flat(record, prefix=""):
-    """(key, text) of a nested record; long lists are told by their length."""
+    """(key, text) of what a nested record says in few words: not the bodies and steps that stand in files of
+    their own."""
     for key, value in record.items():
         name = f"{prefix}{key}"
         if isinstance(value, dict):
             yield from _flat(value, f"{name}: ")
-        elif isinstance(value, list) and (len(value) > 8 or any(isinstance(v, (dict, list)) for v in value)):
-            yield name, f"{len(value)} entries"
-        elif isinstance(value, float):
-            yield name, f"{value:.6g}"
         elif isinstance(value, list):
-            yield name, ", ".join(f"{v:.6g}" if isinstance(v, float) else str(v) for v in value)
-        else:
-            yield name, str(value)
+            if value and len(value) <= 8 and not any(isinstance(v, (dict, list)) for v in value):
+                yield name, ", ".join(f"{v:.6g}" if isinstance(v, float) else str(v) for v in value)
+        elif isinstance(value, bool):
+            yield name, "yes" if value else "no"
+        elif value is not None and value != "":
+            yield name, f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _computed(run):
@@ -372,5 +382,10 @@ def _computed(run):
         ("finite elements (solve/run.json)", run.solve.record if run.solve else {}),
     ]
     for title, record in records:
-        out += _table([title, ""], _flat(record)) if record else _missing(f"No record: {title}.")
+        told = _table([title, ""], _flat(record))
+        out += _folded(f"Record of the {title}", told) if record else _missing(f"No record of the {title}.")
     return out
+
+
+def _folded(title, content):
+    return f"<details><summary>{escape(title)}</summary>{content}</details>"

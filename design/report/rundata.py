@@ -22,7 +22,8 @@ from pneunet.reduced.choice import TRAINED
 DISTANCES = ("smallest_wall_distance_mm", "body_distance_mm")
 #: what the report reads of the records, and of what type it is where it stands there
 OF_DESIGN: dict[str, Any] = {"inputs": dict, "inputs.law": str}
-OF_SOLVE: dict[str, Any] = {"contact": bool, "control": str, "limit_points": list, "pressure_kPa": Real}
+OF_SOLVE: dict[str, Any] = {"contact": bool, "control": str, "limit_points": list}
+OF_SOLVE |= {"pressure_kPa": Real, "mesh_size_mm": Real}
 OF_SOLVE |= {
     f"{touch}_{what}": Real
     for touch in ("first_touch", "first_body_touch")
@@ -132,6 +133,7 @@ def read_design_folder(directory: str | Path) -> "DesignFolder":
     walls = whole(_walls, "solve/walls.csv", design, instead=[])
     solve = whole(_solve, "solve", design, walls, record)
     ours = {"body": body_tables(design.manipulator), "loads": design.loads.table()}
+    ours["pressure_shares"] = list(design.shares)
     stale = solve is not None and any(record.get(name, value) != value for name, value in ours.items())
     return DesignFolder(
         directory,

@@ -65,17 +65,13 @@ def cross_section(
     view.cut(solids, voids, segment_colour(group[0]))
     view.axes_cross()
     top, low = s.chamber_top, s.chamber_bottom
-    view.heading(_named(group, "through a chamber, along x"))
-    view.horizontal(
-        -s.cavity_width / 2,
-        s.cavity_width / 2,
-        s.cavity_top,
-        top + view.mm(0.2),
-        f"cavity {plain(s.cavity_width)}",
-    )
-    view.horizontal(
-        s.cavity_width / 2, half, s.cavity_top, top + view.mm(0.2 + ROW), f"side wall {plain(s.side_wall)}"
-    )
+    view.heading(_named(group, f"through {'a chamber' if s.chambers else 'the core'}, along x"))
+    if s.chambers:
+        inner = s.cavity_width / 2
+        view.horizontal(-inner, inner, s.cavity_top, top + view.mm(0.2), f"cavity {plain(s.cavity_width)}")
+        view.horizontal(
+            inner, half, s.cavity_top, top + view.mm(0.2 + ROW), f"side wall {plain(s.side_wall)}"
+        )
     view.horizontal(
         -s.channel_width / 2,
         s.channel_width / 2,

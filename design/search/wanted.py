@@ -5,13 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneunet.base.curve import Curve
-from pneunet.design.search.space import RANGES, prototype
+from pneunet.base.errors import InputError
+from pneunet.design.search.possible import out_of_reach
+from pneunet.design.search.space import RANGES, limits, prototype
 from pneunet.design.segmentation.segment import segment
 from pneunet.design.segmentation.segmentation import Segmentation
 from pneunet.design.target.extraction import Extracted, extract
 from pneunet.design.target.points import STRIDE, strides
 from pneunet.design.target.reach import ANGLES, reach
-from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Target
+from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Target
 from pneunet.geometry.parameters import TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
 
@@ -23,6 +25,14 @@ TOLERANCE = 1e-3
 LOADED_TOLERANCE = 1e-2
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
 FAITHFUL = 2e-3
+
+#: what a target may ask for that the search does not use yet, by field of Target
+NOT_YET = {
+    "weights": "weights of points",
+    "gravity": "gravity",
+    "shapes": "further shapes",
+    "tip": "points of the tip",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +47,21 @@ class Wanted:
 
 
 def wanted(target: Target, law: SegmentLaw) -> Wanted:
-    """The Wanted of a Target: its own pieces, or those that it is split into."""
+    """The Wanted of a Target: its own pieces, or those that it is split into. InputError where none of them
+    is to bend or to twist."""
+    found = _given_or_found(target, law)
+    if all(piece.kind == PASSIVE for piece in found.pieces):
+        raise InputError(
+            "the curve is straight and no twist is asked for: a plain piece of silicone follows it, and"
+            " there is"
+            " nothing to inflate; give points that bend, frames that turn, or a [[piece]] with tau_rad_per_mm"
+        )
+    unused = [words for name, words in NOT_YET.items() if np.any(getattr(target, name))]
+    told = (f"NOT used by the search yet: {', '.join(unused)}",) if unused else ()
+    return replace(found, notes=(*found.notes, *told, *out_of_reach(target, found.pieces, law)))
+
+
+def _given_or_found(target, law):
     if target.pieces and not target.split.refine:
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
     options = target.split
@@ -62,9 +86,11 @@ def reachable(target: Target, law: SegmentLaw) -> dict[str, tuple[float, float]]
     pressure = target.pressure_range[1] if target.pressure_range else PRESSURE_LIMIT
     out = {}
     for kind in (BENDING, TWISTING):
-        like = prototype(target, Extracted(kind, 50.0, 0.0, 0.0, 0.0))
+        piece = Extracted(kind, 50.0, 0.0, 0.0, 0.0)
+        like = prototype(target, piece)
+        own = limits(target, piece, like).get("chamber_height")
         heights = {"chamber_height": [like.chamber_height, like.chamber_height + _half(like.kind)]}
-        vary = {"chamber_height": target.vary["chamber_height"]} if target.vary else heights
+        vary = heights if target.vary is None else {"chamber_height": own[0]} if own else {}
         found = reach(like, [pressure], law, ANGLES, vary)
         across = int(np.argmin(abs(found.angles - 90.0)))
         twist = float(np.nanmax(abs(found.twist), initial=0.0))
@@ -86,16 +112,18 @@ def _half(kind):
 
 
 def _on_curve(target, curve):
-    """The Target with a Curve's points instead of its own, and the frames that were nearest by arc length."""
-    frames = target.frames
-    if frames is not None:
-        s, own = curve.arc_lengths / curve.length, target.curve.arc_lengths / target.length
-        frames = frames[np.abs(own[:, None] - s).argmin(axis=0)]
-    return replace(target, points=curve.points, frames=frames, weights=None)
+    """The Target with a Curve's points instead of its own, and the frames and weights that were nearest by
+    arc length."""
+    s, own = curve.arc_lengths / curve.length, target.curve.arc_lengths / target.length
+    nearest = np.rint(np.interp(s, own, np.arange(len(own)))).astype(int)
+    kept = {name: getattr(target, name) for name in ("frames", "weights")}
+    kept = {name: values if values is None else values[nearest] for name, values in kept.items()}
+    return replace(target, points=curve.points, **kept)
 
 
 def _extracted(split: Segmentation, target: Target):
-    """`Extracted` of the pieces that were found; twists at an end are seen by frames or a fixed base."""
+    """`Extracted` of the pieces that were found; twists at an end are seen by frames or a fixed base
+    alone."""
     last = len(split.pieces) - 1
     for i, p in enumerate(split.pieces):
         seen = target.frames is not None or (i < last and (i > 0 or target.base_rotation is not None))

@@ -1,4 +1,4 @@
-"""A rod against points: misfit across the tangent, its slopes, Levenberg and Marquardt's steps, the criterion.
+"""A rod against points: misfit across the tangent, slopes, Levenberg and Marquardt's steps, the criterion.
 
 Every point has a foot on the rod. The feet slide along the tangent with each trial (variable projection), so
 that the misfit is the part of point minus foot across the tangent. Section frames, where given, count by what
@@ -13,7 +13,7 @@ from math import lgamma
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.design.segmentation.rod import Rod, Station
+from pneunet.design.segmentation.rod import PiecewiseRod, Station
 from pneunet.design.target.target import BENDING, HELICAL, PASSIVE
 from pneunet.geometry.parameters import TWISTING
 
@@ -22,6 +22,8 @@ STRAIN = 0.03  # 1/mm, standard deviation of strains before any point is seen
 #: mm by which a piece is too short that counts as one standard deviation: in the search, at its end
 SOFT, FIRM = 0.1, 0.01
 PIECE = 4.0  # price of a piece in the criterion, -2 log of its prior odds
+ASTRAY = 0.4  # of the length: feet further from where their points are along the curve are wrong
+ENOUGH = 2500  # steps, some two seconds
 #: largest steps: rad, mm (start and joints), 1/mm
 CAPS = (0.5, 20.0, 0.02)
 #: (k1 free, k2 free) -> kind
@@ -33,16 +35,31 @@ KINDS = {
 }
 
 
+@dataclass
+class Effort:
+    """Steps of Levenberg and Marquardt that a split has taken; above ENOUGH nothing further is tried."""
+
+    steps: int = 0
+
+    @property
+    def spent(self) -> bool:
+        return self.steps > ENOUGH
+
+
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and, where given, frames (n, 3, 3)
-    and the section frame base (3, 3) at the first point; weights (n,), 1 on average. lever: mm at which their turns are measured.
-    shortest: length of a piece, mm, which slack lets it miss. reach: {kind: (largest
-    |k1|, largest |k2|)} in 1/mm; a kind that is not named has no limits."""
+    """What a rod is fitted to: points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and,
+    where given, frames (n, 3, 3), the section frame base (3, 3) at the first point, weights (n,), 1 on
+    average.
+
+    places (n,): first arc lengths of the points, mm. lever: mm at which turns of frames are measured.
+    shortest: length of a piece, mm, which slack lets it miss. reach: {kind: (largest |k1|, largest |k2|)} in
+    1/mm; a kind that is not named has no limits. noise_seen: the points were enough to tell the noise.
+    """
 
     points: np.ndarray
     noise: float
-    length: float
+    places: np.ndarray
     frames: np.ndarray | None = None
     base: np.ndarray | None = None
     weights: np.ndarray | None = None
@@ -50,6 +67,13 @@ class Observations:
     shortest: float = 20.0
     slack: float = SOFT
     reach: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    noise_seen: bool = True
+    effort: Effort = field(default_factory=Effort)
+
+    @property
+    def length(self) -> float:
+        """Of the curve, mm."""
+        return float(self.places[-1])
 
     @property
     def joint_price(self) -> float:
@@ -64,11 +88,11 @@ class Observations:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RodFit:
     """A rod with free strains (n, 2) and the feet's arc lengths (m,) of the points that it is fitted to."""
 
     data: Observations
-    rod: Rod
+    rod: PiecewiseRod
     free: np.ndarray
     feet: np.ndarray
 
@@ -96,6 +120,7 @@ class Fit:
     def _roots(self):
         """(m, 3 or 6) of the points' weights; what is along the tangent has none."""
         columns = 3 if self.data.frames is None else 6
+        assert self.data.weights is not None
         roots = np.repeat(np.sqrt(self.data.weights)[:, None], columns, axis=1)
         roots[:, 0] = 1.0
         return roots
@@ -135,14 +160,14 @@ class Fit:
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Indices of the parameters that are free, among all of `Rod.slopes`."""
+        """Indices of the parameters that are free, among all of `PiecewiseRod.slopes`."""
         fixed = 5 + len(self.free)
         return np.concatenate([np.arange(fixed), fixed + np.flatnonzero(self.free)])
 
     @cached_property
     def bounds(self) -> tuple[float, np.ndarray, np.ndarray]:
-        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of pieces that
-        are too short."""
+        """Cost, gradient (-1/2 of it) and curvature by all parameters of the strains' prior and of pieces
+        that are too short."""
         data, n = self.data, len(self.free)
         size, fixed = 5 + 3 * n, 5 + n
         gradient, curvature = np.zeros(size), np.zeros((size, size))
@@ -162,6 +187,12 @@ class Fit:
                     gradient += row * lacking / data.slack**2
                     curvature += np.outer(row, row) / data.slack**2
         return cost, gradient, curvature
+
+    @property
+    def sound(self) -> bool:
+        """Whether joints are in order and feet about where their points are along the curve."""
+        off = np.ptp(self.feet - self.data.places)
+        return bool((np.diff(self.rod.joints) > 1.0).all() and off < max(ASTRAY * self.data.length, 20.0))
 
     @property
     def kinds(self) -> list[str]:
@@ -209,7 +240,7 @@ class Fit:
         """(m, 1 + 2 or 5, p) of the feet along the tangent, then of what is fitted, by all parameters."""
         return self.slopes_of(self.rod, self.station)
 
-    def slopes_of(self, rod: Rod, station: Station) -> np.ndarray:
+    def slopes_of(self, rod: PiecewiseRod, station: Station) -> np.ndarray:
         """The same for a rod that is this one but for cuts."""
         moved, turned = rod.slopes(station)
         if self.data.frames is not None:
@@ -267,7 +298,7 @@ class Fit:
         places = joints * self.data.joint_price - 2 * lgamma(joints + 1)
         return float(self.cost + size + strains + places)
 
-    def stepped(self, step: np.ndarray) -> "Fit":
+    def stepped(self, step: np.ndarray) -> "RodFit":
         """With the free parameters changed by `step` (q,) and the feet moved along."""
         n = len(self.free)
         full = np.zeros(5 + 3 * n)
@@ -276,20 +307,20 @@ class Fit:
         start[:3, :3] = se3.exp_rotation(full[:3]) @ start[:3, :3]
         start[:3, 3] += full[3:6]
         strains = np.clip(self.rod.strains + full[5 + n :].reshape(n, 2), -self.most, self.most)
-        rod = Rod(start, self.rod.joints + full[6 : 5 + n], strains)
+        rod = PiecewiseRod(start, self.rod.joints + full[6 : 5 + n], strains)
         slide = self.away[:, 0] - self.slopes[:, 0, self.columns] @ step
-        return Fit(self.data, rod, self.free, self.feet + slide)
+        return RodFit(self.data, rod, self.free, self.feet + slide)
 
-    def within_reach(self) -> "Fit":
+    def within_reach(self) -> "RodFit":
         """With strains that can be reached."""
         if not self.data.reach:
             return self
         strains = np.clip(self.rod.strains, -self.most, self.most)
-        return Fit(self.data, Rod(self.rod.start, self.rod.joints, strains), self.free, self.feet)
+        return RodFit(self.data, PiecewiseRod(self.rod.start, self.rod.joints, strains), self.free, self.feet)
 
-    def settled(self) -> "Fit":
+    def settled(self) -> "RodFit":
         """With the feet slid to where they belong."""
-        return Fit(self.data, self.rod, self.free, self.feet + self.away[:, 0])
+        return RodFit(self.data, self.rod, self.free, self.feet + self.away[:, 0])
 
 
 def capped(step: np.ndarray, joints: int) -> np.ndarray:
@@ -303,7 +334,7 @@ def capped(step: np.ndarray, joints: int) -> np.ndarray:
     return step / max(1.0, *sizes)
 
 
-def refined(fit: Fit, steps: int = 30, enough: float = 0.02) -> Fit:
+def refined(fit: RodFit, steps: int = 30, enough: float = 0.02) -> RodFit:
     """The local optimum, by Levenberg and Marquardt's steps until one gains less than `enough`."""
     damping = 1e-3
     fit = fit.within_reach()
@@ -318,9 +349,10 @@ def refined(fit: Fit, steps: int = 30, enough: float = 0.02) -> Fit:
             step = np.linalg.solve(curvature + np.diag(damping * diagonal), gradient)
             step = capped(step, len(fit.free) - 1)
             trial = fit.stepped(step)
-            if (np.diff(trial.rod.joints) > 1.0).all() and abs(trial.away[:, 0]).max() > 0.2:
+            if trial.sound and abs(trial.away[:, 0]).max() > 0.2:
                 trial = trial.settled()
-            gain = fit.cost - trial.cost if (np.diff(trial.rod.joints) > 1.0).all() else -np.inf
+            gain = fit.cost - trial.cost if trial.sound else -np.inf
+            fit.data.effort.steps += 1
             if gain > 0:
                 break
             if damping > 1e3 or -gain < enough:

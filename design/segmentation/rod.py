@@ -1,10 +1,11 @@
-"""A rod of pieces of constant strain (k1, k2) in a section frame that is continuous along it, with derivatives.
+"""A rod of pieces of constant strain (k1, k2) in a section frame that is continuous along it, with slopes.
 
-Stretch 1; k2 > 0 bends towards -z of the section frame, as a one-sided segment with its chambers above does,
-and k2 < 0 is the same piece rolled by 180 degrees. With w^2 = k1^2 + k2^2, S = sin(wu)/w, B = (1 - cos wu)/w^2
-and C = (wu - sin wu)/w^3 a piece leads over the length u to the point (u - C k2^2, C k1 k2, -B k2) of the
-frame at its start. The first and the last piece go on beyond their ends, so that no length is a parameter.
-Every parameter moves what follows as a rigid body: exact derivatives are rotations and velocities of joints.
+Stretch 1; k2 > 0 bends towards -z of the section frame, as a one-sided segment with its chambers above
+does, and k2 < 0 is the same piece rolled by 180 degrees. With w^2 = k1^2 + k2^2, S = sin(wu)/w,
+B = (1 - cos wu)/w^2 and C = (wu - sin wu)/w^3 a piece leads over the length u to the point
+(u - C k2^2, C k1 k2, -B k2) of the frame at its start. The first and the last piece go on beyond their
+ends, so that no length is a parameter. Every parameter moves what follows as a rigid body: exact derivatives
+are rotations and velocities of joints.
 """
 
 from dataclasses import dataclass
@@ -37,9 +38,9 @@ def _coefficients(w2, u):
 
 
 def advance(strains: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Where strains (..., 2) lead over lengths u (...): points (..., 3) and frames (..., 3, 3) in the frame at
-    the start, and the slopes of both by the strains: velocities (..., 3, 2) of the point, rotations (..., 3, 2)
-    of the frame."""
+    """Where strains (..., 2) lead over lengths u (...): points (..., 3) and frames (..., 3, 3) in the frame
+    at the start, and the slopes of both by the strains: velocities (..., 3, 2) of the point, rotations (...,
+    3, 2) of the frame."""
     k1, k2 = strains[..., 0], strains[..., 1]
     S, B, C, dB, dC = _coefficients(k1 * k1 + k2 * k2, u)
     k11, k12, k22 = k1 * k1, k1 * k2, k2 * k2
@@ -62,8 +63,8 @@ def advance(strains: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Station:
-    """Points of a rod at arc lengths s (n,): piece (n,) index of each one's piece, points (n, 3), frames (n, 3,
-    3), and the slopes of a point by its own piece's strains in its frame: velocities and rotations (n, 3,
+    """Points of a rod at arc lengths s (n,): piece (n,) index of each one's piece, points (n, 3), frames (n,
+    3, 3), and the slopes of a point by its own piece's strains in its frame: velocities and rotations (n, 3,
     2)."""
 
     s: np.ndarray
@@ -75,7 +76,7 @@ class Station:
 
 
 @dataclass(frozen=True, eq=False)
-class Rod:
+class PiecewiseRod:
     """start (4, 4): the section frame at s = 0; joints (n - 1,): increasing arc lengths, mm; strains (n, 2):
     (k1, k2) of the pieces, 1/mm."""
 
@@ -152,12 +153,12 @@ class Rod:
             turned[rows, :, column] = station.rotations[:, :, a]
         return moved, turned
 
-    def cut(self, places: np.ndarray) -> "Rod":
+    def cut(self, places: np.ndarray) -> "PiecewiseRod":
         """The same rod with further joints at `places` (m,), increasing, at which nothing changes."""
         joints = np.concatenate([self.joints, places])
         order = np.argsort(joints, kind="stable")
         middles = np.concatenate([[joints[order][0] - 1.0], joints[order]]) if len(joints) else np.zeros(1)
-        return Rod(
+        return PiecewiseRod(
             self.start,
             joints[order],
             self.strains[np.searchsorted(self.joints, middles, side="right")],

@@ -10,9 +10,10 @@ from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.design.segmentation import words
 from pneunet.design.segmentation.ends import ends
-from pneunet.design.segmentation.fit import Fit, Observations, refined
-from pneunet.design.segmentation.rod import Rod
-from pneunet.design.segmentation.search import POLISH, allowed, searched
+from pneunet.design.segmentation.fit import Observations, RodFit, refined
+from pneunet.design.segmentation.moves import allowed
+from pneunet.design.segmentation.rod import PiecewiseRod
+from pneunet.design.segmentation.search import POLISH, searched
 from pneunet.design.segmentation.segmentation import Segmentation
 from pneunet.design.segmentation.start import first_rods
 from pneunet.design.segmentation.windows import Stretches, arc_lengths
@@ -41,8 +42,8 @@ def segment(
 ) -> Segmentation:
     """The `Segmentation` of a target's points, and of its section frames and fixed base where it has them.
 
-    options: by default the target's own. Pieces that the target has keep their kinds and order and are refined
-    from where they are. reach: {kind of piece: (largest |twist|, largest curvature)} in 1/mm
+    options: by default the target's own. Pieces that the target has keep their kinds and order and are
+    refined from where they are. reach: {kind of piece: (largest |twist|, largest curvature)} in 1/mm
     of what can be built; a kind that is not named has no limits. Deterministic; some 0.05 s for 150 points.
     """
     options = options or target.split
@@ -53,8 +54,8 @@ def fitted(
     target: Target,
     options: SplitOptions | None = None,
     reach: Mapping[str, tuple[float, float]] | None = None,
-) -> tuple[Fit, float]:
-    """The `Fit` behind it, before conventions and words, and the noise of what it was fitted to, mm."""
+) -> tuple[RodFit, float]:
+    """The `RodFit` behind it, before conventions and words, and the noise of what it was fitted to, mm."""
     options = options or target.split
     points, frames, weights = _thinned(target)
     if len(points) < len(target.points):
@@ -66,19 +67,19 @@ def fitted(
     data = Observations(
         points,
         floor,
-        length,
+        s,
         frames=frames,
         base=target.base_rotation,
         weights=weights,
         shortest=shortest,
     )
     stretches = Stretches(points, s, floor, shortest, frames)
-    data = replace(data, noise=stretches.noise)
+    data = replace(data, noise=stretches.noise, noise_seen=stretches.noise_seen)
     if target.pieces:
         fit = refined(_given(target, data, s), POLISH, 1e-4)
     else:
         fit = found(data, stretches, options.most_pieces)
-        said = _noise(fit, floor)
+        said = _noise(fit, floor, options.most_pieces)
         if said != (data.noise, data.lever):
             # what the whole rod leaves says more than what the shortest stretches do
             data = replace(data, noise=said[0], lever=said[1])
@@ -95,20 +96,22 @@ def fitted(
 
 
 def _given(target, data, s):
-    """The `Fit` of the target's own pieces where the best rigid motion puts them."""
+    """The `RodFit` of the target's own pieces where the best rigid motion puts them."""
     pieces = extract(target, target.pieces)
     strains = np.array([[p.twist, -p.curvature if p.roll == 180 else p.curvature] for p in pieces])
     free = np.array([[p.kind in (TWISTING, HELICAL), p.kind in (BENDING, HELICAL)] for p in pieces])
     ends = np.cumsum([p.length for p in pieces])
-    rod = Rod(np.eye(4), ends[:-1] * s[-1] / ends[-1], strains * free)
+    rod = PiecewiseRod(np.eye(4), ends[:-1] * s[-1] / ends[-1], strains * free)
     start = best_rigid_fit(rod.at(s).points, data.points, np.ones(len(s)))
-    return Fit(data, replace(rod, start=start), free, s)
+    return RodFit(data, replace(rod, start=start), free, s)
 
 
-def _noise(fit, floor):
+def _noise(fit, floor, most):
     """(noise, lever) that a fit speaks for; those that were assumed where they will do, or where the points
     are too far from any rod to say anything."""
     noise, lever = fit.data.noise, fit.data.lever
+    if (fit.lengths < fit.data.shortest + 1.0).any() or len(fit.free) == most:
+        return noise, lever  # it may be the limits that keep it away
     left = max(fit.noise, floor)
     if 0.5 < left / noise < 2.0 and not 0.8 < left / noise < 1.25:
         noise = left
@@ -118,7 +121,7 @@ def _noise(fit, floor):
     return noise, lever
 
 
-def found(data: Observations, stretches: Stretches, most: int) -> Fit:
+def found(data: Observations, stretches: Stretches, most: int) -> RodFit:
     """The best rod of at most `most` pieces from all starts."""
     best = None
     for price in PRICES:

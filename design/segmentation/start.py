@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.design.segmentation.fit import Fit, Observations
-from pneunet.design.segmentation.rod import Rod, advance
+from pneunet.design.segmentation.fit import Observations, RodFit
+from pneunet.design.segmentation.rod import PiecewiseRod, advance
 from pneunet.design.segmentation.windows import Stretch, Stretches
 from pneunet.design.target.extraction import turn_about_axis
 
@@ -83,7 +83,9 @@ def _parts(stretches, chosen):
     return parts
 
 
-def first_rods(data: Observations, stretches: Stretches, loose: tuple[float, ...], price: float) -> list[Fit]:
+def first_rods(
+    data: Observations, stretches: Stretches, loose: tuple[float, ...], price: float
+) -> list[RodFit]:
     """The chain's rods, not yet refined, one for each bound of `loose` (rad): where two curved pieces meet in
     planes further apart, modulo half a turn, a twisting piece is put between."""
     chosen = chain(stretches, data.noise, price)
@@ -96,8 +98,8 @@ def first_rods(data: Observations, stretches: Stretches, loose: tuple[float, ...
         seen.add(tuple(np.round(joints, 6)))
         # the longest stretch's frame is where it was found; that of a straight one may have any roll
         anchor = max(range(len(parts)), key=lambda i: (parts[i].wanted[1], parts[i].high - parts[i].low))
-        stretch, part = chosen[anchor][0], parts[anchor]
-        rod = Rod(np.eye(4), np.array(joints), np.array(strains))
+        stretch = chosen[anchor][0]
+        rod = PiecewiseRod(np.eye(4), np.array(joints), np.array(strains))
         station = rod.at(np.array([stretch.s]))
         turn = stretch.pose[:3, :3]
         own = strains[place[anchor]][1]
@@ -106,7 +108,9 @@ def first_rods(data: Observations, stretches: Stretches, loose: tuple[float, ...
         here = se3.make_pose(station.frames[0], station.points[0])
         there = se3.make_pose(turn, stretch.pose[:3, 3])
         start = there @ se3.inverse_pose(here)
-        rods.append(Fit(data, Rod(start, rod.joints, rod.strains), np.array(free, bool), stretches.s))
+        rods.append(
+            RodFit(data, PiecewiseRod(start, rod.joints, rod.strains), np.array(free, bool), stretches.s)
+        )
     return rods
 
 

@@ -67,8 +67,11 @@ class Stretch:
 
 
 class Stretches:
-    """All `Stretch`es of points (n, 3) at first arc lengths s (n,); noise: standard deviation, mm, or None for
-    what the shortest stretches say, at least `floor`."""
+    """All `Stretch`es, `found`, of points (n, 3) at first arc lengths s (n,), mm.
+
+    floor: least noise, mm. shortest: length of the first stretches, mm. noise: what these say, at least the
+    floor; estimate: without it.
+    """
 
     def __init__(
         self,
@@ -85,6 +88,7 @@ class Stretches:
         self.index[-1] = len(s)
         self.feet = np.tile(s, (count, 1))
         self.noise = self.estimate = floor
+        self.noise_seen = False
         self.found: dict[tuple[int, int], Stretch] = {}
         least = max(1, int(np.ceil(min(shortest, s[-1]) / (s[-1] / count) - 0.1)))
         self._start(s, least)
@@ -103,7 +107,10 @@ class Stretches:
                 self._fit(fitted, cells, FIRST_STEPS)
             fits = [self.found[a, a + cells] for a in fitted]
             hopeful = [f.square < self.noise**2 * (f.left + HOPELESS) for f in fits]
-            active = np.sort(np.concatenate([active[~some], fitted[np.array(hopeful, bool)]]))
+            if cells >= 2 * least - 1:  # below, every length is needed for stretches to fill the curve
+                active = np.sort(np.concatenate([active[~some], fitted[np.array(hopeful, bool)]]))
+        if (0, count) not in self.found:
+            self._fit(np.zeros(1, int), count, FIRST_STEPS)
 
     def _start(self, s, least):
         """First poses, at the middles of the first stretches, and strains from quadratics."""
@@ -128,12 +135,11 @@ class Stretches:
             up = -down / np.linalg.norm(down)
             self.turn[a] = np.column_stack([tangent, np.cross(up, tangent), up])
             if self.frames is not None:
-                self._from_frames(a, s, i, j)
+                self._from_frames(a, s, self.frames, i, j)
 
-    def _from_frames(self, a, s, i, j):
-        middle = (i + j) // 2
-        self.turn[a] = self.frames[middle]
-        turned = se3.log_rotation(self.frames[i].T @ self.frames[j - 1]) / max(s[j - 1] - s[i], 1e-9)
+    def _from_frames(self, a, s, frames, i, j):
+        self.turn[a] = frames[(i + j) // 2]
+        turned = se3.log_rotation(frames[i].T @ frames[j - 1]) / max(s[j - 1] - s[i], 1e-9)
         self.strains[a] = np.clip(turned[:2], -3 * STRAIN, 3 * STRAIN)
 
     def _fit(self, a, cells, steps):
@@ -214,6 +220,7 @@ class Stretches:
     def _estimate_noise(self, floor):
         """From the median of what the shortest stretches leave; those across a joint leave more."""
         spread = [f.square / f.left for f in self.found.values() if f.left >= 5]
+        self.noise_seen = bool(spread)
         if spread:
             left = np.median([f.left for f in self.found.values() if f.left >= 5])
             usual = (1 - 2 / (9 * left)) ** 3  # median of chi squared over its degrees of freedom

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pneunet.base.units import PER_MM_PER_M
-from pneunet.design.segmentation.fit import Fit, refined
+from pneunet.design.segmentation.fit import RodFit, refined
 from pneunet.design.target.target import PASSIVE, Piece, SplitOptions, Target
 from pneunet.geometry.parameters import TWISTING
 
@@ -19,12 +19,14 @@ def thinned(points: int) -> str:
     return f"{points} points are more than the split needs: means of neighbouring ones are used"
 
 
-def told(fit: Fit, pieces: Sequence[Piece], target: Target, options: SplitOptions) -> Iterator[str]:
+def told(fit: RodFit, pieces: Sequence[Piece], target: Target, options: SplitOptions) -> Iterator[str]:
     """The notes of a final fit."""
     data, last = fit.data, len(pieces) - 1
     framed = data.frames is not None
     if len(target.points) > len(data.points):
         yield thinned(len(target.points))
+    if not data.noise_seen:
+        yield f"too few points to tell their noise: {data.noise:.2g} mm is assumed; tolerance_mm says it"
     for i, (piece, length) in enumerate(zip(pieces, fit.lengths)):
         name = f"piece {i + 1}"
         if piece.kind == PASSIVE and not framed:
@@ -44,14 +46,14 @@ def told(fit: Fit, pieces: Sequence[Piece], target: Target, options: SplitOption
         worst = int(np.argmax(np.sum(fit.away[:, 1:] ** 2, axis=1)))
         away = float(np.linalg.norm(fit.away[worst, 1:]))
         yield (
-            f"the points lie {fit.rms:.3g} mm (root mean square) off the pieces, more than their noise explains"
+            f"the points lie {fit.rms:.3g} mm (root mean square) off the pieces, more than noise explains"
             f" ({data.noise:.2g} mm a coordinate), most at {fit.feet[worst] - fit.feet[0]:.0f} mm"
             f" ({away:.3g} mm): corners, or pieces shorter than {data.shortest:.3g} mm, are not followed"
         )
     if len(pieces) >= options.most_pieces:
         yield (
-            f"{len(pieces)} pieces are the most that are allowed: a larger tolerance_mm asks for fewer, a larger"
-            " most_pieces allows more"
+            f"{len(pieces)} pieces are the most that are allowed: a larger tolerance_mm asks for fewer, a"
+            " larger most_pieces allows more"
         )
 
 

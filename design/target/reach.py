@@ -4,6 +4,7 @@ of a target lies within them."""
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,7 +77,7 @@ def reach(
     pressures: ArrayLike,
     law: SegmentLaw,
     angles: ArrayLike = ANGLES,
-    vary: Mapping[str, Sequence[float]] | None = None,
+    vary: Mapping[str, Sequence[Any]] | None = None,
 ) -> Reach:
     """The Reach of segments like `segment` at other angles (a,), at pressures (p,) in MPa.
 
@@ -85,8 +86,9 @@ def reach(
     angles, pressures = np.sort(np.atleast_1d(angles).astype(float)), np.sort(np.atleast_1d(pressures))
     found = None
     for values in product(*(vary or {}).values()):
+        changes: dict[str, Any] = dict(zip(vary or {}, values))
         try:
-            changed = replace(segment, **dict(zip(vary or {}, values)))
+            changed = replace(segment, **changes)
             alike = [replace(changed, angle=float(angle)) for angle in angles]
         except InputError as error:
             reason = error

@@ -16,7 +16,8 @@ from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
 from pneunet.design.target.shapes import TargetShape, TipPoints, checked_pressures
 from pneunet.geometry.loading import DeadLoads
 
-#: kinds of pieces beside TWISTING, which is straight and turns about itself; PASSIVE: straight, no twist wanted
+#: kinds of pieces beside TWISTING, which is straight and turns about itself; PASSIVE: straight, with no twist
+#: wanted
 BENDING, HELICAL, PASSIVE = "bending", "helical", "passive"
 LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
 
@@ -60,8 +61,8 @@ class Target:
     coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of several groups of
     segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip: `TipPoints` as the
     pressure rises; material; casting: what can be cast; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice; split: how it is split; source: name of the file that it was read
-    from.
+    Segment: (low, high)} or None for the default choice; split: how it is split; source: name of the file
+    that it was read from.
     """
 
     points: np.ndarray

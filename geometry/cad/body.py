@@ -1,8 +1,9 @@
 """Parametric CAD of a manipulator in gmsh's OpenCASCADE kernel.
 
-Recipe: parallelogram prisms from plan polygons; the outer solids of each segment fused; all cavities fused
-with the channel; everything fragmented, so that the boundary of the cavity volumes is the exact cavity
-surface. The cavities are then removed and the faces tagged.
+Recipe: parallelogram prisms from plan polygons, turned by the segment's roll; the outer solids of each
+segment fused; all cavities of a pressure group fused with their channel; everything fragmented, so that the
+boundary of the cavity volumes is the exact cavity surface. The cavities are then removed and the faces
+tagged.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,6 +17,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.system.interrupts import at_once
 from pneunet.geometry import tags
 from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.sections import channel_section
 
 _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
 
@@ -86,7 +88,7 @@ def outer_solids(segment: Segment, start: float) -> list[int]:
         for side in s.sides:
             # from the channel axis upwards: well inside the core, so that only the sides are coplanar
             tags.append(chamber_block(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top))
-    return tags
+    return _rolled(s, tags)
 
 
 def cavity_solids(segment: Segment, start: float, channel_from: float, channel_to: float) -> list[int]:
@@ -104,16 +106,22 @@ def cavity_solids(segment: Segment, start: float, channel_from: float, channel_t
                     s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top
                 )
             )
-    return tags
+    return _rolled(s, tags)
 
 
 def layer_solid(segment: Segment, start: float, stop: float) -> list[int]:
     """[volume tag] of the bottom layer between two x (mm); empty when the segment has none."""
-    return (
-        [box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)]
-        if segment.layer_thickness
-        else []
-    )
+    if not segment.layer_thickness:
+        return []
+    solid = box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)
+    return _rolled(segment, [solid])
+
+
+def _rolled(segment: Segment, solids: list[int]) -> list[int]:
+    """The volumes, turned from the segment's own axes to the body's."""
+    if segment.roll:
+        gmsh.model.occ.rotate([(3, t) for t in solids], 0, 0, 0, 1, 0, 0, np.radians(segment.roll))
+    return solids
 
 
 def pieces(children: Iterable[list[tuple[int, int]]]) -> set[tuple[int, int]]:
@@ -121,32 +129,27 @@ def pieces(children: Iterable[list[tuple[int, int]]]) -> set[tuple[int, int]]:
     return {v for family in children for v in family if v[0] == 3}
 
 
-def channel_range(manipulator: Manipulator) -> tuple[float, float]:
-    """x (mm) at which the channel begins and ends: half a pitch beyond the first and the last chamber, so
-    that every chamber has its whole cell; what remains of the passive ends closes it."""
-    first, last = manipulator.segments[0], manipulator.segments[-1]
-    return (
-        first.chamber_positions[0] - first.pitch / 2,
-        manipulator.starts[-1] + last.chamber_positions[-1] + last.pitch / 2,
-    )
-
-
 def build(manipulator: Manipulator) -> dict[str, float]:
     """Build the manipulator in the current gmsh model: one body volume per segment (two with a bottom layer),
-    tagged faces, one closed cavity.
+    tagged faces, a closed cavity for each pressure group.
 
-    Returns the CAD volumes {"body_mm3", "cavity_mm3"}. Raises InputError when the cavity is not one piece or
-    a segment falls apart.
+    Returns the CAD volumes {"body_mm3", "cavity_mm3"}, the latter of all cavities. Raises InputError when a
+    segment falls apart or a cavity breaks through.
     """
     occ = gmsh.model.occ
-    start_stop = channel_range(manipulator)
-    bodies, cavities, layers = [], [], []
+    bodies, cavities, layers, number = [], [], [], []
     for segment, start in zip(manipulator.segments, manipulator.starts):
         bodies += fuse(outer_solids(segment, start), unify=True)
-        cavities += [tag for tag in cavity_solids(segment, start, *start_stop)]
         layers += [(3, tag) for tag in layer_solid(segment, start, start + segment.length)]
-    # seams are kept: they separate the channel's wall from the chambers'
-    cavities = fuse(cavities, unify=False)
+    for group, start_stop in zip(manipulator.groups, manipulator.channels):
+        own = [
+            t
+            for i in group
+            for t in cavity_solids(manipulator.segments[i], manipulator.starts[i], *start_stop)
+        ]
+        # seams are kept: they separate the channel's wall from the chambers'
+        cavities += (solids := fuse(own, unify=False))
+        number += [len(set(number)) + 1] * len(solids)
     _, parents = occ.fragment(bodies, cavities + layers)
     occ.synchronize()
     inner = len(bodies) + len(cavities)
@@ -181,7 +184,12 @@ def build(manipulator: Manipulator) -> dict[str, float]:
         [i for i, s in enumerate(manipulator.segments) if s.layer_thickness],
         layer_volumes,
     )
-    _tag_faces(manipulator, body_faces, cavity_faces)
+    group_of_face = {
+        abs(t): group
+        for group, family in zip(number, parents[len(bodies) : inner])
+        for _, t in gmsh.model.getBoundary(sorted(pieces([family])), combined=True, oriented=True)
+    }
+    _tag_faces(manipulator, body_faces, {f: group_of_face[f] for f in cavity_faces})
     occ.remove(cavity_volumes)
     occ.synchronize()
     return volumes
@@ -191,8 +199,8 @@ def in_channel(segment: Segment, box: tuple[float, ...]) -> bool:
     """Whether a cavity face with this bounding box (6 numbers) is a piece of the channel's wall (its ends are
     not)."""
     x0, y0, z0, x1, y1, z1 = box
-    in_y = max(abs(y0), abs(y1)) < segment.channel_width / 2 + _TOLERANCE
-    in_z = max(abs(z0), abs(z1)) < segment.channel_height / 2 + _TOLERANCE
+    (low_y, high_y), (low_z, high_z) = channel_section(segment) + [-_TOLERANCE, _TOLERANCE]
+    in_y, in_z = low_y < y0 and y1 < high_y, low_z < z0 and z1 < high_z
     return in_y and in_z and x1 - x0 > 10 * _TOLERANCE
 
 
@@ -204,14 +212,17 @@ def _tag_volumes(first, name, segments, volumes):
         gmsh.model.setPhysicalName(3, first + i, f"{name} {i + 1}")
 
 
-def _tag_faces(manipulator, body_faces, cavity_faces):
-    groups = {tag: [] for tag in tags.FACE_NAMES}
+def _tag_faces(manipulator, body_faces, group_of_face):
+    """group_of_face: pressure group of each face of a cavity."""
+    names = tags.face_names(len(manipulator.groups))
+    groups = {tag: [] for tag in names}
     for face in sorted(body_faces):
         x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(2, face)
-        if face in cavity_faces:
+        if face in group_of_face:
             i = int(np.clip(np.searchsorted(manipulator.starts, (x0 + x1) / 2) - 1, 0, None))
             s = manipulator.segments[i]
-            groups[tags.CHANNEL if in_channel(s, (x0, y0, z0, x1, y1, z1)) else tags.CAVITY].append(face)
+            cavity, channel = tags.cavity_tags(group_of_face[face])
+            groups[channel if in_channel(s, (x0, y0, z0, x1, y1, z1)) else cavity].append(face)
         elif x1 < _TOLERANCE:
             groups[tags.BASE].append(face)
         elif x0 > manipulator.length - _TOLERANCE:
@@ -220,4 +231,4 @@ def _tag_faces(manipulator, body_faces, cavity_faces):
             groups[tags.OUTER].append(face)
     for tag, faces in groups.items():
         gmsh.model.addPhysicalGroup(2, faces, tag)
-        gmsh.model.setPhysicalName(2, tag, tags.FACE_NAMES[tag])
+        gmsh.model.setPhysicalName(2, tag, names[tag])

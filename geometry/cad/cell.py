@@ -50,7 +50,7 @@ def mesh_cell(
         facts = {
             "body_mm3": sum(gmsh.model.occ.getMass(3, v) for v in body),
             "air_mm3": sum(gmsh.model.occ.getMass(3, v) for v in air),
-            "cells": len(mesh.tetrahedra),
+            "cells": len(mesh.cells),
         }
         save(Path(path), mesh, facts)
     return facts

@@ -12,13 +12,13 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
-from pneunet.geometry.meshfile import TetrahedralMesh
+from pneunet.geometry.meshfile import VolumeMesh
 from pneunet.geometry.parameters import Segment
 
 #: some 13 million unknowns: beyond any direct solver
 MOST_CELLS = 3e6
 #: gmsh's types of linear elements
-TRIANGLE, TETRAHEDRON = 2, 4
+TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON = 2, 3, 4, 5
 
 
 def refuse_absurd(mesh_size: float, parts: Iterable[tuple[Segment, float, int]]) -> None:
@@ -31,14 +31,14 @@ def refuse_absurd(mesh_size: float, parts: Iterable[tuple[Segment, float, int]])
     )
     cells = 6 * np.sqrt(2) * room / mesh_size**3  # regular tetrahedra
     if cells > MOST_CELLS:
-        fit = mesh_size * np.cbrt(cells / MOST_CELLS)
+        fit = np.ceil(100 * mesh_size * np.cbrt(cells / MOST_CELLS)) / 100
         raise InputError(
-            f"mesh_size_mm = {mesh_size:g} would give some {cells:.0e} cells, more than {MOST_CELLS:.0e}:"
-            f" choose a coarser mesh, {fit:.2g} mm or more"
+            f"mesh_size_mm = {mesh_size:g} would give some {cells:.3g} cells, more than {MOST_CELLS:g}:"
+            f" choose a coarser mesh, {fit:g} mm or more"
         )
 
 
-def tetrahedral_mesh() -> TetrahedralMesh:
+def tetrahedral_mesh() -> VolumeMesh:
     """What the current gmsh model has meshed of its tagged volumes and faces, group after group."""
     numbers, points, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(numbers)
@@ -50,12 +50,10 @@ def tetrahedral_mesh() -> TetrahedralMesh:
         given = np.repeat(np.array([tag for _, tag in owners]), [len(each) for each in rows])
         return np.searchsorted(numbers[order], np.concatenate(rows)), given
 
-    return TetrahedralMesh(
-        points.reshape(-1, 3)[order], *elements(3, TETRAHEDRON, 4), *elements(2, TRIANGLE, 3)
-    )
+    return VolumeMesh(points.reshape(-1, 3)[order], *elements(3, TETRAHEDRON, 4), *elements(2, TRIANGLE, 3))
 
 
-def save(path: Path, mesh: TetrahedralMesh, facts: dict[str, Any]) -> None:
+def save(path: Path, mesh: VolumeMesh, facts: dict[str, Any]) -> None:
     """Write the .npz `path` and, beside it, gmsh's file of the current model."""
     gmsh.option.setNumber("Mesh.Binary", 1)
     write_model(path.with_suffix(".msh"))

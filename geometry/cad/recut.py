@@ -17,9 +17,9 @@ def recut(path: str | Path, other: str | Path, pitch: float, beyond: float) -> N
     The new cut is the jagged surface that those tetrahedra leave.
     """
     mesh, facts = read_mesh(path)
-    X, tets = mesh.points, mesh.tetrahedra
+    X, tets = mesh.points, mesh.cells
     shift = (X[tets][:, :, 0].mean(axis=1) > beyond).astype(int)
-    solid = mesh.tetrahedron_tags != AIR
+    solid = mesh.cell_tags != AIR
     sides = np.sort(tets[solid][:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]], axis=2)
     shift_of_face = dict(zip(map(tuple, sides.reshape(-1, 3)), np.repeat(shift[solid], 4)))
     moved = 2 * tets + shift[:, None]
@@ -28,6 +28,6 @@ def recut(path: str | Path, other: str | Path, pitch: float, beyond: float) -> N
     replace(
         mesh,
         points=X[used // 2] - np.outer(used % 2, [pitch, 0, 0]),
-        tetrahedra=np.searchsorted(used, moved),
+        cells=np.searchsorted(used, moved),
         facets=np.searchsorted(used, facets),
     ).write(other, facts)

@@ -1,4 +1,4 @@
-"""A whole manipulator, clamped at its base, under dead loads and one cavity pressure."""
+"""A whole manipulator, clamped at its base, under dead loads and the pressure of its cavities."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +27,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.rod_coordinates import RodCoordinates
 from pneunet.hifi.path.stepping import Step, StepResult, StepSize, run_steps
+from pneunet.hifi.path.system import PathControl
 
 #: rad, all stations together; Newton on slender bodies is limited by how far they turn in a step, not by how
 #: far they strain
@@ -38,7 +39,8 @@ DEAD_LOADS = "dead loads"
 @dataclass(frozen=True)
 class Measured:
     """One accepted state, the same on all ranks but for `walls`, the smallest distance in each gap (rank 0
-    only). Pressure in MPa, lengths in mm. touch: whether parts of the body run into each other.
+    only). Pressure in MPa, of several groups the largest; volume: BodyProblem.cavity_volume; lengths in mm.
+    touch: whether parts of the body run into each other.
 
     dead_loads: the fraction of them that acts. unstable: unstable directions at fixed loads of the tangent
     factorised last: at this very state if stability_factorisations is 1, in this step or before otherwise.
@@ -76,11 +78,13 @@ class ManipulatorSolve:
         loads: DeadLoads | None = None,
         hold_tip: bool = False,
         contact: WallPenalty | None = None,
+        shares: Sequence[float] | None = None,
     ):
         """flip_y mirrors the mesh at the plane y = 0: for a mirrored manipulator on the original's mesh.
         loads: geometry.loading.DeadLoads in the body's axes. hold_tip: the tip's face stays at its place at
         rest. contact: the hifi.contact.penalty.WallPenalty between neighbouring chambers; without it they may
-        pass through each other."""
+        pass through each other. shares: of the pressure in each group's cavity, the largest 1; by default
+        all."""
         self.manipulator, self.comm, self.newton_options = manipulator, comm, newton_options
         mesh, cell_tags, facet_tags = compat.read_mesh(mesh_path, comm)
         if flip_y:
@@ -89,13 +93,18 @@ class ManipulatorSolve:
         materials |= {
             tags.LAYER + i: s.layer_material for i, s in enumerate(manipulator.segments) if s.layer_thickness
         }
-        self.pressure = Pressure((tags.CAVITY, tags.CHANNEL))
+        shares = [1.0] * len(manipulator.groups) if shares is None else list(shares)
+        self.pressures = [
+            Pressure(tags.cavity_tags(group), share=share) for group, share in enumerate(shares, start=1)
+        ]
+        #: of the group with the largest
+        self.pressure = self.pressures[shares.index(max(shares))]
         self.dead = _dead(loads or DeadLoads(), materials)
         supports = [Support(tags.BASE)] + [Support(tags.TIP)] * hold_tip
         self.problem = BodyProblem(
-            mesh, cell_tags, facet_tags, materials, supports, [self.pressure, *self.dead]
+            mesh, cell_tags, facet_tags, materials, supports, [*self.pressures, *self.dead]
         )
-        spacing = float(np.mean([s.pitch for s in manipulator.segments]))
+        spacing = float(np.mean([s.pitch for s in manipulator.segments if s.chambers]))
         coordinates = RodCoordinates(self.problem.nodes, self.problem.owned_nodes, comm, spacing)
         self.system = BodySystem(self.problem, coordinates, self._set_pressure)
         self.sections = SectionFrames(self.problem, manipulator)
@@ -117,7 +126,8 @@ class ManipulatorSolve:
 
     # ---- the stages of loading: what the one load factor of the system means
     def _set_pressure(self, value):
-        self.pressure.value.value = value
+        for pressure in self.pressures:
+            pressure.value.value = pressure.share * value
 
     def _set_dead(self, fraction):
         for load in self.dead:
@@ -131,9 +141,12 @@ class ManipulatorSolve:
         else:
             self._set_dead(1.0)
             self.system.steer(self._set_pressure, float(self.pressure.value.value))
-        control = {"volume": VolumeControl, "arc length": lambda: ArcLength(self.system)}.get(
-            stage, LoadControl
-        )()
+        controls: dict[str, Callable[[], PathControl]] = {
+            DEAD_LOADS: lambda: LoadControl("the dead loads"),
+            "volume": VolumeControl,
+            "arc length": lambda: ArcLength(self.system),
+        }
+        control = controls.get(stage, LoadControl)()
         start = {"volume": self.system.volume(), "arc length": 0.0}.get(stage, self.system.load)
         before, self.stage = self.path, stage
         self.path = EquilibriumPath(self.system, control, self.newton_options, start)

@@ -37,8 +37,8 @@ class BodyProblem(MixedField):
     """A body, its materials, its clamps and its loads.
 
     mesh, cell_tags, facet_tags: as dolfinx gives them. materials: {cell tag: base.materials.laws law}, or one
-    law. supports: list of `Support`. loads: list of hifi.fem.loads objects; the first closed `Pressure` is
-    the cavity whose volume is measured.
+    law. supports: list of `Support`. loads: list of hifi.fem.loads objects; each `Pressure` has a cavity
+    whose volume is measured.
     """
 
     def __init__(
@@ -77,8 +77,12 @@ class BodyProblem(MixedField):
             for load, part in external
             if load.has_tangent
         ]
-        cavity = next((load.volume_form for load in self.loads if isinstance(load, Pressure)), None)
-        self._volume = [compat.compile_form(cavity)] if cavity else []
+        #: (share, form) of each cavity's volume
+        self._volumes = [
+            (load.share, compat.compile_form(load.volume_form))
+            for load in self.loads
+            if isinstance(load, Pressure)
+        ]
 
     def _support_condition(self, support):
         facets = self.facet_tags.find(support.tag)
@@ -167,8 +171,9 @@ class BodyProblem(MixedField):
             added.destroy()
 
     def cavity_volume(self) -> float:
-        """Volume (mm3) of the closed cavity; 0 without one."""
-        return self.integral(self._volume)
+        """Volume (mm3) of the closed cavity, 0 without one. Each of several counts with its share of the
+        pressure: the body's pressure does its work on this sum."""
+        return sum(share * self.integral([volume]) for share, volume in self._volumes)
 
     def stored_energy(self) -> float:
         """N mm, in the material and in the overlaps of walls."""

@@ -1,6 +1,7 @@
 """How the tip of an inflated manipulator yields, and how hard it pushes: passive tip stiffness and blocked
 force."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -74,16 +75,23 @@ def blocked_force(
     loads: DeadLoads,
     comm: MPI.Comm,
     contact: WallPenalty | None = None,
+    shares: Sequence[float] | None = None,
 ) -> dict[str, Any]:
-    """run.json's `blocked_force`: what the tip, held where it is at rest, pushes with at `pressure` (MPa);
-    collective.
+    """run.json's `blocked_force`: what the tip, held where it is at rest, pushes with at `pressure` (MPa;
+    of several groups the largest, of which `shares` are parts); collective.
 
     Gravity acts from the start, tip loads do not: they would go straight into what holds the tip. Force and
     moment about the tip frame's origin at rest, body axes. Where the held body cannot be inflated so far, the
     last pressure reached counts.
     """
     held = ManipulatorSolve(
-        manipulator, mesh_path, comm, loads=DeadLoads(gravity=loads.gravity), hold_tip=True, contact=contact
+        manipulator,
+        mesh_path,
+        comm,
+        loads=DeadLoads(gravity=loads.gravity),
+        hold_tip=True,
+        contact=contact,
+        shares=shares,
     )
     try:
         if pressure or held.dead:

@@ -10,8 +10,9 @@ from pneunet.base.files.toml import as_table, from_table, refuse_unknown, to_tab
 from pneunet.base.materials.laws import material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
-from pneunet.geometry.designfile import segment_from_table
-from pneunet.geometry.parameters import Segment
+from pneunet.geometry.designfile import segment_from_table, segment_table
+from pneunet.geometry.meshfile import ELEMENTS
+from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.contact.medium import ThirdMedium
 from pneunet.hifi.contact.penalty import WallPenalty
 
@@ -43,7 +44,9 @@ class CellCase(Checked):
     control: 'pressure', or 'volume', which walks through a limit point of the pressure up to `volume_factor`
     times the volume at rest. contact: 'auto': walls that touch are held apart by the `penalty`;
     'third-medium': by the `medium` in the gap; 'none': they pass through each other. graded: elements shrink
-    to mesh_size * EDGE at the body's edges, where stresses are singular.
+    to mesh_size * EDGE at the body's edges, where stresses are singular; of hexahedra there is one layer of
+    this thickness on each side of the planes in which those edges lie. element: tetrahedra of gmsh's, or
+    hexahedra of a sheared grid.
     """
 
     segment: Segment
@@ -57,9 +60,18 @@ class CellCase(Checked):
     penalty: WallPenalty = WallPenalty()
     medium: ThirdMedium = ThirdMedium()
     graded: bool = quantity(None, False)
+    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.segment.kind not in KINDS:
+            raise InputError(f"kind = '{self.segment.kind}': a cell is a pitch of chambers, which it has not")
+        for key, usual, value in (
+            ("roll_deg", 0, self.segment.roll),
+            ("pressure_group", 1, self.segment.group),
+        ):
+            if value != usual:
+                raise InputError(f"{key} = {value}: a cell is one by itself, in its own axes: leave it out")
         if self.control == "volume" and (self.held or self.contact == "third-medium"):
             what = "[held] strains go" if self.held else "contact = 'third-medium' goes"
             raise InputError(f"{what} with control = 'pressure'")
@@ -81,7 +93,8 @@ def cell_from_tables(data: dict[str, Any], where: str) -> CellCase:
             raise InputError(f"{where}: key '{key}' is missing")
     held = astuple(from_table(Held, data.get("held", {}), f"{where} [held]"))
     row = as_table(data["segment"], f"{where} [segment]")
-    row.setdefault("chambers", 1)
+    if row.get("kind") in KINDS:
+        row.setdefault("chambers", 1)
     materials = [
         material_from_table(data[key], f"{where} [{key}]") if key in data else None
         for key in ("material", "layer_material")
@@ -100,7 +113,7 @@ def cell_tables(case: CellCase) -> dict[str, Any]:
     segment = case.segment
     tables = to_table(case) | {
         "material": material_to_table(segment.material),
-        "segment": to_table(segment),
+        "segment": segment_table(segment),
         "held": {STRAINS[i]: value for i, value in case.held.items()},
     }
     if segment.layer_material is not None:

@@ -11,6 +11,7 @@ ranks, not cells.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -19,17 +20,17 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from pneunet.geometry import tags
+from pneunet.geometry.meshfile import read_mesh
 from pneunet.geometry.parameters import Segment
+from pneunet.hifi.cell.symmetry import Orbits, SymmetryClass, characters, group, windows
 from pneunet.hifi.contact.cell import CellContact
 from pneunet.hifi.contact.gaps import Contact
 from pneunet.hifi.contact.medium import ThirdMedium
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.contact.walls import CellWalls, WallContact
-from pneunet.hifi.fem import compat, surface
+from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.compat import compile_form
 from pneunet.hifi.fem.materials import energy_density
 from pneunet.hifi.fem.mixed_field import MixedField
@@ -37,11 +38,8 @@ from pneunet.hifi.fem.potential import PotentialEnergy, Term
 from pneunet.hifi.fem.stretch import PrincipalStretch
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
-#: rows of the gauge that see e2 and e3: a sideways displacement X1 e turns about z and y
-_SIDEWAYS = np.zeros((6, 6))
-_SIDEWAYS[4, 2], _SIDEWAYS[5, 1] = -1, 1
 #: attributes that depend on where the nodes are
-_PLACED = ("segment", "nodes", "gauge", "gauge_strains", "walls", "contact", "_bordered")
+_PLACED = ("segment", "nodes", "classes", "walls", "contact")
 
 
 class CellProblem(MixedField):
@@ -53,7 +51,8 @@ class CellProblem(MixedField):
     section frame; centre: X1 (mm) where that frame sits, in the middle of the pitch over which it is fitted.
     rollers: {facet tag: component of u that is zero}. contact: the hifi.contact.penalty.WallPenalty between
     the walls of the gaps. medium: or a hifi.contact.medium.ThirdMedium that fills the gaps, which must be
-    meshed then; without it, meshed gaps are void.
+    meshed then; without it, meshed gaps are void. Where the mesh is a part of the cell from which half turns
+    make the rest (geometry.grids.cell), states have this symmetry.
     """
 
     def __init__(
@@ -66,14 +65,24 @@ class CellProblem(MixedField):
         medium: ThirdMedium | None = None,
         contact: WallPenalty | None = None,
     ):
+        part = not isinstance(mesh, tuple) and bool(read_mesh(mesh)[1].get("part"))
+        if part and (contact or medium):
+            raise ValueError("contact needs the whole cell")
         super().__init__(*(mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, MPI.COMM_SELF)))
         self.segment, self._gauge_of, self._penalty = segment, (gauge, centre), contact
+        #: (g, 3) diagonals of the rotations that make the cell of the mesh
+        self.turns = group(segment.kind if part else None)
         self.medium = medium.on(self.mesh) if medium else None
         self.strains = fem.Constant(self.mesh, PETSc.ScalarType(np.eye(6)[0]))
         self.pressure = fem.Constant(self.mesh, PETSc.ScalarType(0.0))
         self._direction = fem.Constant(self.mesh, PETSc.ScalarType(np.zeros(6)))
         self._define_forms()
-        self._reduce(rollers or {})
+        places = (self.nodes, self.pressure_space.tabulate_dof_coordinates())
+        #: of the displacement's and of the pressure's nodes
+        self.orbits = [Orbits(points, segment.pitch, self.turns) for points in places]
+        used = self._used()
+        #: hifi.cell.symmetry.SymmetryClass: that of the free state, then the others
+        self.classes = [SymmetryClass(self, chi, rollers or {}, used) for chi in characters(self.turns)]
         self._place()
         solid = np.isin(self.cell_tags.values, (tags.BODY, tags.LAYER))
         self.stretch = PrincipalStretch(self, self.cell_tags.indices[solid])
@@ -81,14 +90,39 @@ class CellProblem(MixedField):
     def _place(self):
         """What depends on where the nodes are."""
         self.nodes = self.node_positions()
-        self._define_gauge(*self._gauge_of)
+        self.classes, over = [copy(each) for each in self.classes], windows(self, *self._gauge_of)
+        for each in self.classes:
+            each.define_gauge(over, self._gauge_of[1])
         self.walls = CellWalls(self)
         self.contact = (
             CellContact(self, self.walls, self._penalty)
             if self._penalty
             else Contact(MPI.COMM_SELF, self.unknowns + 6, slice(0, self.unknowns + 6))
         )
-        self._bordered = None
+
+    # ---- the class in which states are
+    @property
+    def unknowns(self) -> int:
+        return self.classes[0].unknowns
+
+    @property
+    def reduced(self) -> np.ndarray:
+        """(dofs,) index of each mixed dof among the unknowns, -1 where it is zero or not there."""
+        return self.classes[0].reduced
+
+    @property
+    def gauge(self) -> sp.csr_matrix:
+        """(unknowns, m): the conditions on u that make (e, k) the strains of the section frame."""
+        return self.classes[0].gauge
+
+    @property
+    def gauge_strains(self) -> np.ndarray:
+        """(m, 6): the same conditions' parts of (e, k)."""
+        return self.classes[0].gauge_strains
+
+    def expand(self, values: np.ndarray) -> np.ndarray:
+        """State array of the mixed space from the unknowns (unknowns,)."""
+        return self.classes[0].expand(values)
 
     def move(self, segment: Segment, vertices: np.ndarray) -> None:
         """Make this the cell of another segment, on the same mesh with its vertices (n, 3) elsewhere."""
@@ -114,14 +148,17 @@ class CellProblem(MixedField):
         E1 = ufl.unit_vector(0, 3)
         self.deformation_gradient = F = grad_y + ufl.outer(e + ufl.cross(k, y), E1)
         J, air = ufl.det(F), self.cells(tags.AIR)
+        # energies are those of the whole pitch
+        whole = fem.Constant(self.mesh, PETSc.ScalarType(float(len(self.turns))))
         mu = fem.Constant(self.mesh, PETSc.ScalarType(segment.material.mu))
         solids = ((tags.BODY, segment.material), (tags.LAYER, segment.layer_material))
         terms = [
-            Term(energy_density(self.mesh, material, F, self.p), self.cells(tag))
+            Term(whole * energy_density(self.mesh, material, F, self.p), self.cells(tag))
             for tag, material in solids
             if material is not None
         ]
-        terms.append(Term(AIR_STIFFNESS * mu / 2 * (ufl.inner(F, F) - 2 * J), air, self.pressure * J))
+        resting = AIR_STIFFNESS * mu / 2 * (ufl.inner(F, F) - 2 * J)
+        terms.append(Term(whole * resting, air, whole * self.pressure * J))
         if self.medium:
             # d(Q F)/dX, rotated back: F's own gradient, and along X1 that of the screw
             spin = ufl.as_matrix([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
@@ -138,80 +175,17 @@ class CellProblem(MixedField):
         self._slope = [compile_form(ufl.inner(slope, t) * d) for slope, d in slopes]
         self._mixed = [compile_form(ufl.derivative(w * d, self.state, self.test)) for w, d in along]
         self._curvature = [compile_form(ufl.inner(ufl.diff(w, q), t) * d) for w, d in along]
-        self._volume = [compile_form(J * air)]
+        self._volume = [compile_form(whole * J * air)]
         self._matrix = self.create_matrix()
 
-    def _reduce(self, rollers):
-        """reduced (dofs,): index of each mixed dof among the unknowns; slaves share their master's, air's p
-        has -1."""
-        pitch, n = self.segment.pitch, len(self.state.x.array)
-        master = np.arange(n)
-        points = self.pressure_space.tabulate_dof_coordinates()
-        for coordinates, dofs in (
-            (self.nodes, self.displacement_dofs),
-            (points, self.pressure_dofs[:, None]),
-        ):
-            first = _same_modulo(coordinates, pitch)
-            master[dofs] = dofs[first]
+    def _used(self):
+        """(dofs,) bool: u where there is body, air or a medium, p where there is body."""
         solid = self.cell_tags.indices[~np.isin(self.cell_tags.values, (tags.AIR, tags.GAP))]
-        used = np.zeros(n, bool)
         there = self.cell_tags.indices[(self.cell_tags.values != tags.GAP) | (self.medium is not None)]
+        used = np.zeros(len(self.state.x.array), bool)
         used[self.displacement_dofs[compat.cell_dofs(self.displacement_space)[there]]] = True
         used[self.pressure_dofs[compat.cell_dofs(self.pressure_space)[solid]]] = True
-        held = np.zeros(n, bool)
-        for tag, component in rollers.items():
-            held[master[self.displacement_dofs[np.unique(surface.facet_nodes(self, tag)), component]]] = True
-        used &= ~held[master]
-        kept = np.unique(master[used])
-        self.reduced = np.full(n, -1)
-        self.reduced[kept] = np.arange(len(kept))
-        self.reduced = np.where(used, self.reduced[master], -1)
-        self.unknowns = len(kept)
-        #: number of incompressibility multipliers: so many negative pivots has a stable tangent
-        self.constraints = int(np.count_nonzero(np.isin(kept, self.pressure_dofs)))
-
-    def _define_gauge(self, tags, centre):
-        """gauge (unknowns, 6) and gauge_strains (6, 6): the section frame's conditions are linear in u and
-        (e, k).
-
-        Mean displacement (3) and mean rotation (3) of the tagged facets over the pitch around `centre` are
-        zero. Their points also lie along X1, where the shears e2 and e3 displace them sideways by X1 e: a
-        frame fitted over a pitch follows mostly the tangent, and so must the gauge.
-        """
-        facets, pitch = surface.facet_nodes(self, *tags), self.segment.pitch
-        # the periodic surface in the window: what is in it of this pitch and of its neighbours
-        windows = [
-            (i * pitch, surface.SlabIntegral(self, facets, *(centre + pitch * (np.array([-0.5, 0.5]) - i))))
-            for i in (-1, 0, 1)
-        ]
-        area, size = sum(w.area for _, w in windows), self.segment.width
-        self.gauge_strains = np.zeros((6, 6))
-        gauge = sp.csr_matrix((self.unknowns, 6))
-        for shift, integral in windows:
-            w, first = integral.weights / area, integral.first / area
-            first[:, 0] += (shift - centre) * w
-            rows = np.zeros((6, len(w), 3))
-            rows[[0, 1, 2], :, [0, 1, 2]] = w
-            for i, (a, b) in enumerate(((1, 2), (2, 0), (0, 1)), start=3):  # (X x u)_i = X_a u_b - X_b u_a
-                rows[i, :, b], rows[i, :, a] = first[:, a] / size, -first[:, b] / size
-            along = ((self.nodes[integral.nodes, 0] + shift - centre) @ first[:, 0]) / size  # X1^2
-            self.gauge_strains += along * _SIDEWAYS
-            columns = self.reduced[self.displacement_dofs[integral.nodes]]
-            moving = columns >= 0
-            for i, row in enumerate(rows):
-                gauge += sp.coo_matrix(
-                    (row[moving], (columns[moving], np.full(moving.sum(), i))), shape=gauge.shape
-                ).tocsr()
-        self.gauge = gauge
-
-    def expand(self, values: np.ndarray) -> np.ndarray:
-        """State array of the mixed space from the unknowns (unknowns,)."""
-        return np.where(self.reduced >= 0, values[self.reduced], 0.0)
-
-    def _unknowns_of(self, forms):
-        """(unknowns,) sum of linear forms."""
-        keep = self.reduced >= 0
-        return np.bincount(self.reduced[keep], self.vector(forms)[keep], minlength=self.unknowns)
+        return used
 
     def _strains_of(self, forms):
         """(6,) integrals of forms with one component for each of (e, k)."""
@@ -219,24 +193,34 @@ class CellProblem(MixedField):
 
     def residual(self) -> tuple[np.ndarray, np.ndarray]:
         """(dPi/du,p (unknowns,), dPi/d(e,k) (6,)) at the current state, strains and pressure."""
-        forces, slope = self._unknowns_of(self._potential.residuals), self._strains_of(self._slope)
+        forces = self.classes[0].collected(self.vector(self._potential.residuals))
+        slope = self._strains_of(self._slope)
         pushing = self.contact.residual()
         return forces + pushing[:-6], slope + pushing[-6:]
 
     def tangent(self) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
-        """(bordered matrix as CSR, d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6))."""
+        """(bordered matrix as CSR, d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6)); rows and columns of
+        strains of other classes are zero."""
         self.assemble(self._matrix, self._potential.tangents)
-        if self._bordered is None:
-            self._bordered = _BorderedPattern(self._matrix, self.reduced, self.gauge)
-        _, _, data = self._matrix.getValuesCSR()
         n, touching = self.unknowns, self.contact.tangent()
         inner = touching[:n, :n].tocoo()
-        matrix = self._bordered.filled(data, inner.row, inner.col, inner.data)
-        mixed, curvature = np.empty((n, 6)), np.empty((6, 6))
-        for i in range(6):
-            self._direction.value[:] = np.eye(6)[i]
-            mixed[:, i], curvature[:, i] = self._unknowns_of(self._mixed), self._strains_of(self._curvature)
+        matrix = self.classes[0].bordered(self._matrix, inner.row, inner.col, inner.data)
+        mixed, curvature = self._by_strains(self.classes[0])
         return matrix, mixed + touching[:n, n:].toarray(), curvature + touching[n:, n:].toarray()
+
+    def tangent_of(self, number: int) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
+        """What `tangent` gives, of another class at the state of the last tangent."""
+        each = self.classes[number]
+        return each.bordered(self._matrix), *self._by_strains(each)
+
+    def _by_strains(self, each):
+        """(d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6)) in a class."""
+        mixed, curvature = np.zeros((each.unknowns, 6)), np.zeros((6, 6))
+        for i in np.flatnonzero(each.strains):
+            self._direction.value[:] = np.eye(6)[i]
+            mixed[:, i] = each.collected(self.vector(self._mixed))
+            curvature[:, i] = self._strains_of(self._curvature) * each.strains
+        return mixed, curvature
 
     def medium_forces(self) -> np.ndarray:
         """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their
@@ -258,66 +242,3 @@ class CellProblem(MixedField):
         """N mm in one pitch: all of the potential but the air's -P V. Along free states its change is the
         integral of P dV."""
         return self._potential.stored_energy() + self.contact.energy()
-
-
-class _BorderedPattern:
-    """Where the entries of a matrix of the mixed space go in that of the unknowns, bordered by the gauge.
-
-    It grows by the entries of walls that touch, and keeps them when they part: a new pattern costs a new
-    analysis.
-    """
-
-    def __init__(self, matrix, reduced, gauge):
-        indptr, indices, _ = matrix.getValuesCSR()
-        rows, columns = reduced[np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))], reduced[indices]
-        self._keep = np.flatnonzero((rows >= 0) & (columns >= 0))
-        border, self._size = gauge.tocoo(), sum(gauge.shape)
-        i, j, corner = (
-            border.row.astype(np.int64),
-            border.col + gauge.shape[0],
-            np.arange(gauge.shape[0], self._size),
-        )
-        self._border = np.concatenate([border.data, border.data, np.zeros(len(corner))])
-        rows = np.concatenate([rows[self._keep], i, j, corner])
-        self._known = self._key(rows, np.concatenate([columns[self._keep], j, i, corner]))
-        self._arrange(self._known)
-
-    def _key(self, rows, columns):
-        return rows * np.int64(self._size) + columns
-
-    def _arrange(self, key):
-        self._keys = np.unique(key)
-        self._place = np.searchsorted(self._keys, self._known)
-        self._indices = (self._keys % self._size).astype(np.int32)
-        self._indptr = np.searchsorted(self._keys, self._size * np.arange(self._size + 1)).astype(np.int32)
-
-    def filled(self, data, rows=(), columns=(), values=()):
-        """CSR matrix of the values `data` of the mixed space's matrix and of entries (row, column, value) of
-        the unknowns.
-
-        Its `indices` are the same array until the pattern grows.
-        """
-        key = self._key(np.asarray(rows, np.int64), np.asarray(columns, np.int64))
-        place = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        if (self._keys[place] != key).any():
-            self._arrange(np.concatenate([self._keys, key]))
-            place = np.searchsorted(self._keys, key)
-        entries = np.concatenate([data[self._keep], self._border, values])
-        summed = np.bincount(np.concatenate([self._place, place]), entries, len(self._keys))
-        return sp.csr_matrix((summed, self._indices, self._indptr), shape=(self._size, self._size))
-
-
-def _same_modulo(points, pitch, tolerance=1e-5):
-    """(n,) index of the first of those points (n, 3) that coincide when X1 is taken modulo the pitch;
-    tolerance in mm."""
-    wrapped = points.copy()
-    wrapped[:, 0] = np.mod(points[:, 0], pitch)
-    wrapped[wrapped[:, 0] >= pitch, 0] = 0.0
-    far = 2 * np.ptp(points, axis=0) + 1.0
-    wrapped[:, 1:] -= wrapped[:, 1:].min(axis=0)  # the tree's box starts at zero
-    pairs = cKDTree(wrapped, boxsize=[pitch, *(2 * far[1:])]).query_pairs(tolerance, output_type="ndarray")
-    graph = sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, labels = connected_components(graph, directed=False)
-    first = np.full(labels.max() + 1, len(points))
-    np.minimum.at(first, labels, np.arange(len(points)))
-    return first[labels]

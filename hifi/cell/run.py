@@ -1,5 +1,6 @@
 """One pitch of a segment from rest to a pressure, free or at prescribed strains, with its rod stiffness."""
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.cad.grid import grid_cell
 from pneunet.hifi.cell.file import EDGE, CellCase
 from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.cell.symmetry import characters, group, strains_of
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellState, CellSystem
 from pneunet.hifi.contact.medium import soften
 from pneunet.hifi.contact.touch import Load, TouchWatch
@@ -18,6 +21,7 @@ from pneunet.hifi.path.equilibrium import EquilibriumPath, LimitPoint
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
 
+log = logging.getLogger(__name__)
 #: iterations that a lagged tangent may still need in contact, where tangents age fast
 CONTACT_PATIENCE = 10.0
 
@@ -36,13 +40,62 @@ def solve_cell(
     on_touch(pressure): told the pressure (MPa) of first touch, once, before the first state beyond it.
     ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
     """
-    edge_size = case.mesh_size * EDGE if case.graded else None
-    medium = case.medium if case.contact == "third-medium" else None
-    facts = mesh_cell(case.segment, case.mesh_size, mesh_path, gaps=medium is not None, edge_size=edge_size)
+    told = {"states": 0, "limit points": 0}
+    if _has_half_turns(case):
+        # a part of the cell will do until walls touch
+
+        def stop(pressure: float) -> None:
+            if case.contact == "auto":
+                raise _Touched
+            on_touch(pressure)
+
+        facts = _mesh(case, mesh_path, part=True)
+        try:
+            tell = _counted(on_state, told, "states"), _counted(on_limit_point, told, "limit points")
+            return follow_path(case, CellProblem(case.segment, mesh_path), *tell, stop), facts
+        except _Touched:
+            pass
+    facts, medium = _mesh(case, mesh_path), case.medium if case.contact == "third-medium" else None
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )
-    return follow_path(case, problem, on_state, on_limit_point, on_touch), facts
+    tell = _after(on_state, told["states"]), _after(on_limit_point, told["limit points"])
+    return follow_path(case, problem, *tell, on_touch), facts
+
+
+class _Touched(Exception):
+    """Walls have met in a part of a cell, which knows no contact."""
+
+
+def _counted(call, counts, name):
+    """`call`, which counts up counts[name]."""
+
+    def counting(thing):
+        counts[name] += 1
+        call(thing)
+
+    return counting
+
+
+def _after(call, count):
+    """`call` without its first `count` times."""
+    left = iter(range(count))
+    return lambda thing: call(thing) if next(left, None) is None else None
+
+
+def _has_half_turns(case):
+    """Whether a part of the case's cell will do."""
+    turns = group(case.segment.kind)
+    alike = strains_of(characters(turns)[0], turns)[list(case.held)].all()
+    return case.element == "hexahedra" and case.contact != "third-medium" and bool(alike)
+
+
+def _mesh(case, path, part=False):
+    """Facts of the mesh that the case asks for, of the whole cell or a part of it."""
+    edge, gaps = case.mesh_size * EDGE if case.graded else None, case.contact == "third-medium"
+    if case.element == "tetrahedra":
+        return mesh_cell(case.segment, case.mesh_size, path, gaps=gaps, edge_size=edge)
+    return grid_cell(case.segment, case.mesh_size, path, edge, gaps, part)
 
 
 def follow_path(
@@ -130,7 +183,8 @@ def _hold(problem, free, case, options, on_step):
     system = CellSystem(problem, held, (case.pressure, 0.0), (start, change))
     system.state = free.state.copy()
     try:
-        run_steps(EquilibriumPath(system, LoadControl(), options), 1.0, StepSize(0.25, 1e-3), on_step)
+        path = EquilibriumPath(system, LoadControl("the way to the held strains"), options)
+        run_steps(path, 1.0, StepSize(0.25, 1e-3), on_step)
     except BaseException:
         system.destroy()
         raise

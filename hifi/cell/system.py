@@ -93,14 +93,17 @@ class CellSystem:
         strains: tuple[np.ndarray, np.ndarray] | None = None,
     ):
         self.problem, self.pitch = problem, problem.segment.pitch
-        self.held = np.zeros(6, bool) if held is None else np.asarray(held, bool)
+        # strains of other classes than the states' stay as they are
+        self.held = ~problem.classes[0].strains
+        if held is not None:
+            self.held = self.held | held
         self._free = np.flatnonzero(~self.held)
         self._pressure = pressure
         self._strains = (
             [np.eye(6)[0], np.zeros(6)] if strains is None else [np.asarray(s, float) for s in strains]
         )
-        n = problem.unknowns
-        self._x = np.concatenate([np.zeros(n + 6), self._strains[0]])
+        self._inner = sum(problem.gauge.shape)
+        self._x = np.concatenate([np.zeros(self._inner), self._strains[0]])
         self._solver = self._matrix = self._pattern = None
         self._factorisations = 0
         self.walls = problem.walls
@@ -115,9 +118,8 @@ class CellSystem:
     @state.setter
     def state(self, x: np.ndarray) -> None:
         self._x = x
-        n = self.problem.unknowns
-        self.problem.array[:] = self.problem.expand(x[:n])
-        self.problem.strains.value[:] = x[n + 6 :]
+        self.problem.array[:] = self.problem.expand(x[: self.problem.unknowns])
+        self.problem.strains.value[:] = x[-6:]
 
     @property
     def load(self) -> float:
@@ -140,7 +142,7 @@ class CellSystem:
         n = self.problem.unknowns
         forces, slope = self.problem.residual()
         gauge, gauge_strains = self.problem.gauge, self.problem.gauge_strains
-        multipliers, strains = self._x[n : n + 6], self._x[n + 6 :]
+        multipliers, strains = self._x[n:-6], self._x[-6:]
         r = np.concatenate([forces + gauge @ multipliers, gauge.T @ self._x[:n] + gauge_strains @ strains])
         return r, slope + gauge_strains.T @ multipliers
 
@@ -167,24 +169,21 @@ class CellSystem:
         return gradient
 
     def factorise(self) -> None:
-        """Factorise the tangent. influence (unknowns + 6, 6): how unknowns and multipliers resist strains,
-        K^-1 d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
+        """Factorise the tangent. influence (unknowns and multipliers, 6): how these resist strains, K^-1
+        d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
         on."""
         matrix, mixed, self._curvature = self.problem.tangent()
         if self._pattern is not matrix.indices:
             self._release()
             self._pattern = matrix.indices
-            self._matrix = PETSc.Mat().createAIJ(
-                matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
-            )
-            self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-            self._solver = DirectSolver(self._matrix, MPI.COMM_SELF)
+            self._matrix, self._solver = _solver(matrix)
         else:
             self._matrix.setValuesCSR(matrix.indptr, matrix.indices, matrix.data)
             self._matrix.assemble()
         self._solver.factorise()
         self._factorisations += 1
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
+        self._mixed *= self.problem.classes[0].strains
         self.influence = self._solver.solve_many(self._mixed)
         self.condensed = self._curvature - self._mixed.T @ self.influence
         self._update = ContactUpdate(self.problem.contact.stiffnesses(factorised=True))
@@ -195,7 +194,9 @@ class CellSystem:
 
     def _gap_gradients(self, points):
         rows, n = self.problem.contact.gradients(points), self.problem.unknowns
-        return np.hstack([rows[:, :n], np.zeros((len(rows), 6)), rows[:, n:][:, self._free] / self.pitch])
+        return np.hstack(
+            [rows[:, :n], np.zeros((len(rows), self._inner - n)), rows[:, n:][:, self._free] / self.pitch]
+        )
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was
@@ -203,12 +204,12 @@ class CellSystem:
         return self._update.corrected(self._solve(right[:, None])[:, 0])
 
     def solve_inner(self, right: np.ndarray) -> np.ndarray:
-        """Inverse of the factorised tangent at held strains times right (unknowns + 6, columns)."""
+        """Inverse of the factorised tangent at held strains times right (unknowns and multipliers, n)."""
         return self._solver.solve_many(right)
 
     def _solve(self, right):
         """K^-1 right (., columns) with the factorised tangent: bordering."""
-        free, n = self._free, self.problem.unknowns + 6
+        free, n = self._free, self._inner
         z = self.solve_inner(right[:n])
         if not len(free):
             return z
@@ -221,7 +222,8 @@ class CellSystem:
         """Unstable directions of the factorised state: each multiplier takes one negative pivot, strains
         count apart."""
         free = self.condensed[np.ix_(self._free, self._free)]
-        inner = self._solver.negative_pivots - self.problem.constraints - 6
+        own = self.problem.classes[0]
+        inner = self._solver.negative_pivots - own.constraints - own.gauge.shape[1]
         return inner + int(np.count_nonzero(np.linalg.eigvalsh(free) < 0))
 
     @property
@@ -251,8 +253,13 @@ class CellSystem:
 
     # ---- what the rod needs
     def measure(self) -> CellState:
-        """CellState of the present equilibrium; factorises its tangent."""
+        """CellState of the present equilibrium; factorises its tangent, in all classes of symmetry."""
         self.factorise()
+        stiffness, unstable = self.condensed.copy(), self.unstable
+        for number in range(1, len(self.problem.classes)):
+            _, part, more = self.of_class(number)
+            stiffness += part
+            unstable += more
         _, slope = self._parts()
         q = self._x[-6:]
         return CellState(
@@ -260,15 +267,33 @@ class CellSystem:
             RodStrains(q[:3].copy(), q[3:].copy()),
             slope[:3] / self.pitch,
             slope[3:] / self.pitch,
-            self.condensed / self.pitch,
+            stiffness / self.pitch,
             self.problem.air_volume(),
-            self.unstable,
+            unstable,
             self.problem.stretch.largest(),
             self.walls.distance(),
             self.problem.segment.gap if self.walls.gaps else np.inf,
             self.problem.measure_contact(),
             self.problem.array.copy(),
         )
+
+    def of_class(self, number: int) -> tuple[np.ndarray, np.ndarray, int]:
+        """(influence, condensed, unstable directions) of another class of symmetry at the factorised
+        state."""
+        each = self.problem.classes[number]
+        matrix, mixed, curvature = self.problem.tangent_of(number)
+        mixed = np.vstack([mixed, each.gauge_strains * each.strains])
+        assembled, solver = _solver(matrix)
+        try:
+            solver.factorise()
+            influence = solver.solve_many(mixed)
+            condensed = curvature - mixed.T @ influence
+            own = condensed[np.ix_(each.strains, each.strains)]
+            unstable = solver.negative_pivots - each.constraints - each.gauge.shape[1]
+            return influence, condensed, unstable + int(np.count_nonzero(np.linalg.eigvalsh(own) < 0))
+        finally:
+            solver.destroy()
+            assembled.destroy()
 
     def _release(self):
         if self._solver is not None:
@@ -277,3 +302,12 @@ class CellSystem:
 
     def destroy(self) -> None:
         self._release()
+
+
+def _solver(matrix):
+    """(PETSc's matrix of a symmetric CSR one, its DirectSolver)."""
+    made = PETSc.Mat().createAIJ(
+        matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
+    )
+    made.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return made, DirectSolver(made, MPI.COMM_SELF)

@@ -41,10 +41,11 @@ class BodyDistance:
 
     def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
-        heights = [s.chamber_top - min(s.core_bottom, s.chamber_bottom) for s in manipulator.segments]
-        self.diameter = max(float(np.hypot(s.width, h)) for s, h in zip(manipulator.segments, heights))
-        self.apart = max(self.diameter, *(s.pitch for s in manipulator.segments))
-        self._local = surface.facet_nodes(problem, tags.OUTER, tags.TIP, tags.BASE)
+        self.diameter = max(
+            float(np.hypot(s.width, s.chamber_top - s.chamber_bottom)) for s in manipulator.segments
+        )
+        self.apart = max(self.diameter, *(s.pitch for s in manipulator.segments if s.chambers))
+        self._local = surface.wall_triangles(problem, tags.OUTER, tags.TIP, tags.BASE)
         X = gathered(self.comm, problem.nodes[self._local])
         if self.comm.rank == 0:
             self._arrange(X)

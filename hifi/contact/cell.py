@@ -33,12 +33,16 @@ class CellContact(Contact):
         self.law = penalty.on(problem.segment.material.mu, problem.segment.gap)
         self._walls = []
         for gap in walls.gaps:
-            rest = [problem.nodes[f] + np.multiply.outer(s, [[1, 0, 0]]) for f, s in gap]
+            rest = [problem.nodes[w.facets] + np.multiply.outer(w.shift, [[1, 0, 0]]) for w in gap]
             middle = np.mean([r[..., 0].mean() for r in rest])
             normal = mean_normal(rest[0]) - mean_normal(rest[1])
             sheets = [
-                _Sheet(f, problem.nodes[f][..., 0] + s[:, None] - middle, surface.reference_areas(problem, f))
-                for f, s in gap
+                _Sheet(
+                    w.facets,
+                    problem.nodes[w.facets][..., 0] + w.shift[:, None] - middle,
+                    surface.reference_areas(problem, w.facets),
+                )
+                for w in gap
             ]
             normal /= np.linalg.norm(normal)
             self._walls += [(sheets, normal), (sheets[::-1], -normal)]

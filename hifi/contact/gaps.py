@@ -44,7 +44,7 @@ class Side:
         return by_position.reshape(-1, 36)
 
     def bend(self) -> np.ndarray:
-        """(pairs, m, m) second derivatives of the energy at fixed pressures."""
+        """(pairs, m, m) second derivatives of the energy at fixed pressures, but for what couples pairs."""
         return -self.touching.push[:, None, None] * self.touching.bend
 
     def _sparse(self, values, rows, count):
@@ -58,11 +58,14 @@ class Side:
         pairs = len(self._columns)
         return self._sparse(self.chained(self.touching.forces), np.zeros(pairs, int), 1).T.tocsr()
 
+    def _by_point(self, by_position):
+        """Sparse (points, size) of what pairs (pairs, 12, 3) add up to."""
+        return self._sparse(self.chained(by_position), self.touching.point, len(self.touching.area))
+
     @cached_property
     def gap_gradients(self) -> sp.csr_matrix:
         """Sparse (points, size): first derivatives of the gaps."""
-        t = self.touching
-        return self._sparse(self.chained(t.gradient), t.point, len(t.area))
+        return self._by_point(self.touching.gradient)
 
     def tangent(self) -> sp.csr_matrix:
         """Sparse (size, size): second derivatives of the energy."""
@@ -70,7 +73,11 @@ class Side:
         columns = self._columns
         places = [np.broadcast_to(c, both.shape)[both] for c in (columns[:, :, None], columns[:, None, :])]
         bend = sp.coo_matrix((self.bend()[both], places), shape=(self._size, self._size)).tocsr()
-        return bend + self.gap_gradients.T @ sp.diags(t.area * t.slope) @ self.gap_gradients
+        # the pairs of a point share its gap and the sum of its weights
+        shared = sp.diags(t.area * t.slope / 2) @ self.gap_gradients
+        shared += sp.diags(t.area * t.pressure) @ self._by_point(t.turn)
+        half = self.gap_gradients.T @ shared
+        return bend + half + half.T
 
 
 class Contact:

@@ -136,7 +136,7 @@ class Softening:
 def soften(system: System, energy: MediumEnergy, options: NewtonOptions) -> float:
     """Walk from the followed medium's equilibrium towards the recorded one's; gamma of the last equilibrium
     on the way."""
-    path = EquilibriumPath(Softening(system, energy), LoadControl(), options)
+    path = EquilibriumPath(Softening(system, energy), LoadControl("the softening"), options)
     try:
         run_steps(path, 1.0, StepSize(0.5, SMALLEST_SOFTENING))
     except ConvergenceError:

@@ -5,10 +5,14 @@ Both walls are sheets of quadratic facets, seen along a fixed direction d from t
 second. There each is a height over the plane normal to d, and the gap at a point x of one wall is the height
 of the other's surface X(xi) over it,
     g = d . (X - x),   X - x parallel to d,   dg = m . (dX - dx),   m = n / (n . d),  n the surface's normal.
-There is no closest-point projection, which jumps. Near a facet's edge, where n jumps, the gaps over the
-facets that meet there (each continued a little beyond its edge) are blended, so that forces are continuous
-and the gradient of an energy. Each wall is held against the other at its own Gauss points, both with half the
-stiffness, so that neither is preferred.
+There is no closest-point projection, which jumps. Near a facet's edge, where n jumps, the gaps g_i over the
+facets that meet there (each continued a little beyond its edge) are blended by weights w_i(xi) to
+    G = sum w_i g_i / W,  W = sum w_i,
+so that forces are continuous and the gradient of an energy. The tangent is the second derivative of the same
+energy, with
+    W d2G = sum (w_i d2g_i + dw_i dg_i + dg_i dw_i + (g_i - G) d2w_i) - dG dW - dW dG.
+Each wall is held against the other at its own Gauss points, both with half the stiffness, so that neither is
+preferred.
 """
 
 from dataclasses import dataclass
@@ -74,8 +78,9 @@ class Touching:
 
     Per point (n,): overlap (mm), area (mm2, undeformed, with the share of this side), energy (N/mm), pressure
     (MPa), slope (MPa/mm); position, normal (n, 3): the point (mm) and the covector m; name (n, 2): facet of
-    this wall and Gauss point on it. Per pair (c,): point, facet of this wall, other of the other wall;
-    gradient (c, 12, 3) of the gap by the six nodes of both, bend (c, 36, 36) its second derivative in 1/mm.
+    this wall and Gauss point on it. Per pair (c,): point, facet of this wall, other of the other wall; what
+    it adds to a point's derivatives by the six nodes of both: gradient (c, 12, 3) to dG, turn (c, 12, 3) to
+    dW / W in 1/mm, bend (c, 36, 36) to d2G in 1/mm, but for -(dG dW + dW dG) / W, which couples pairs.
     """
 
     overlap: np.ndarray
@@ -89,6 +94,7 @@ class Touching:
     facet: np.ndarray
     other: np.ndarray
     gradient: np.ndarray
+    turn: np.ndarray
     bend: np.ndarray
     name: np.ndarray
 
@@ -138,7 +144,7 @@ def touching(
     normal = np.cross(tangents[:, 0], tangents[:, 1])
     facing = -(normal @ direction) > _STEEPEST * np.linalg.norm(normal, axis=1)
     gap = (np.einsum("cn,cni->ci", N, nodes) - position[point]) @ direction
-    share_of, by_xi = _blend(xi)
+    share_of, *shifts = _blend(xi)
     share_of = np.where(facing, share_of, 0.0)
     total = np.bincount(point, share_of, len(facet))
     mean = np.bincount(point, share_of * gap, len(facet)) / np.maximum(total, 1e-300)
@@ -147,17 +153,14 @@ def touching(
     if not len(keep):
         return None
     kept = np.flatnonzero(near)
-    point, other, N, dN, tangents, nodes, normal, gap, share_of, by_xi = (
-        a[keep] for a in (point, other, N, dN, tangents, nodes, normal, gap, share_of, by_xi)
+    point, other, N, dN, tangents, nodes, normal, gap, share_of, by_xi, by_xi_xi = (
+        a[keep] for a in (point, other, N, dN, tangents, nodes, normal, gap, share_of, *shifts)
     )
     m = normal / (normal @ direction)[:, None]
     weights = np.concatenate([-_GAUSS[gauss[point]], N], axis=1)
-    part = share_of / total[point]
-    motion, bend = _bend(weights, m, dN, tangents, nodes, plane)
-    gradient = part[:, None, None] * weights[:, :, None] * m[:, None, :]
-    # the shares move with the point over the facets
-    drift = ((gap - mean[point]) / total[point])[:, None] * by_xi
-    gradient += np.einsum("ca,caw->cw", drift, motion).reshape(gradient.shape)
+    part, by_xi, by_xi_xi = ((a.T / total[point]).T for a in (share_of, by_xi, by_xi_xi))
+    beyond = gap - mean[point]
+    derivatives = _derivatives(weights, m, dN, tangents, nodes, plane, part, by_xi, by_xi_xi, beyond)
     normals = np.zeros((len(facet), 3))
     np.add.at(normals, point, part[:, None] * m)
     own = facet[point]
@@ -173,36 +176,48 @@ def touching(
             np.searchsorted(kept, point),
             own,
             other,
-            gradient,
-            part[:, None, None] * bend,
+            *derivatives,
             np.stack([facet[kept], gauss[kept]], axis=1),
         ),
     )
 
 
+#: barycentric coordinates by the last two; of two different ones the third
+_BY_XI, _THIRD = np.array([[-1, -1], [1, 0], [0, 1]]), np.array([[0, 2, 1], [2, 0, 0], [1, 0, 0]])
+
+
 def _blend(xi):
-    """(c,) share of a facet in the gap at its coordinates xi (c, 2), before all shares are made to add up to
-    one; (c, 2) its slope."""
+    """(c,) weight of a facet in the gap at its coordinates xi (c, 2); its derivatives (c, 2) and (c, 2, 2) by
+    xi."""
     t = np.clip((_full(xi) + _BLEND) / (2 * _BLEND), 0.0, 1.0)
-    value, slope = t * t * (3 - 2 * t), 6 * t * (1 - t) / (2 * _BLEND)
-    a, b, c = value.T
-    by = slope * np.stack([b * c, a * c, a * b], axis=-1)
-    return a * b * c, by[:, 1:] - by[:, :1]
+    rise, width = t * t * (3 - 2 * t), 2 * _BLEND
+    slope, curve = 6 * t * (1 - t) / width, np.where((t > 0) & (t < 1), 6 - 12 * t, 0.0) / width**2
+    a, b, c = rise.T
+    others = np.stack([b * c, a * c, a * b], axis=-1)
+    second = slope[:, :, None] * slope[:, None, :] * rise[:, _THIRD]
+    second[:, range(3), range(3)] = curve * others
+    return a * b * c, (slope * others) @ _BY_XI, _BY_XI.T @ second @ _BY_XI
 
 
-def _bend(weights, m, dN, tangents, nodes, plane):
-    """(n, 2, 36): dxi such that X stays over the point; (n, 36, 36): d2g = m . (X,ab dxi_a dxi_b + 2 N,a dX
-    dxi_a)."""
+def _derivatives(weights, m, dN, tangents, nodes, plane, part, by_xi, by_xi_xi, beyond):
+    """(gradient, turn, bend) of Touching. part, by_xi, by_xi_xi: w / W and the derivatives of w by xi, over
+    W; beyond (c,) mm: g - G.
+
+    Both g and xi follow from X staying over the point: dg = m . (dX - dx), dxi_a = l_a . (dX - dx), and each
+    second derivative is its covector's product with X,ab dxi_a dxi_b + 2 N,a dX dxi_a.
+    """
     n = len(m)
-    # dxi = Z dx: the plane's components of N dX - dx vanish with X,a dxi_a
-    A = np.linalg.inv(np.einsum("pi,cai->cpa", plane, tangents))
-    Z = -np.einsum("cap,pi,cw->cawi", A, plane, weights).reshape(n, 2, 36)
-    T = np.zeros((n, 2, 12, 3))
-    T[:, :, 6:] = dN[..., None] * m[:, None, None, :]
-    T = T.reshape(n, 2, 36)
-    curved = np.einsum("abn,cni,ci->cab", _SECOND, nodes, m)
-    half = np.einsum("cax,cay->cxy", T + np.einsum("cab,cby->cay", curved, Z) / 2, Z)
-    return Z, half + np.swapaxes(half, 1, 2)
+    along = -np.linalg.inv(np.einsum("pi,cai->cpa", plane, tangents)) @ plane
+    dxi = np.einsum("cai,cw->cawi", along, weights).reshape(n, 2, 36)
+    by_gap = np.einsum("ci,cw->cwi", m, weights).reshape(n, 36)
+    turn = np.einsum("ca,cax->cx", by_xi, dxi)
+    gradient = part[:, None] * by_gap + beyond[:, None] * turn
+    covector = part[:, None] * m + beyond[:, None] * np.einsum("ca,cai->ci", by_xi, along)
+    by_dxi = by_xi[:, :, None] * by_gap[:, None, :]
+    by_dxi[:, :, 18:] += np.einsum("can,ci->cani", dN, covector).reshape(n, 2, 18)
+    curved = np.einsum("abn,cni,ci->cab", _SECOND, nodes, covector) + beyond[:, None, None] * by_xi_xi
+    half = np.einsum("cax,cay->cxy", by_dxi + curved @ dxi / 2, dxi)
+    return gradient.reshape(n, 12, 3), turn.reshape(n, 12, 3), half + np.swapaxes(half, 1, 2)
 
 
 def _full(xi):

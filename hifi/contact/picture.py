@@ -30,14 +30,15 @@ def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> b
         distances = node_distances(CellWalls(problem), state.array)
     finally:
         problem.strains.value[:] = kept
-    facets = surface.facet_nodes(problem, tags.OUTER)
+    facets = surface.wall_triangles(problem, tags.OUTER)
     of_facets = distances[facets]
     facing = np.isfinite(of_facets).all(axis=1)
     if not facing.any():
         return False
-    turns = problem.segment.pitch * (np.arange(pitches) - (pitches - 1) / 2)
+    shifts = problem.segment.pitch * (np.arange(pitches) - (pitches - 1) / 2)
+    images = [(turn, shift) for shift in shifts for turn in problem.turns]
     rest, moved = (
-        np.concatenate(x) for x in zip(*(_positions(problem, state, facets, turn) for turn in turns))
+        np.concatenate(x) for x in zip(*(_positions(problem, state, facets, *image) for image in images))
     )
     body = _mesh(rest)
     body.point_data["moved"] = _fine(moved)
@@ -46,8 +47,8 @@ def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> b
     lines, _ = edges(body)
     for mesh in (body, lines):
         mesh.points = mesh.point_data["moved"]
-    walls = _mesh(moved[np.tile(facing, pitches)])
-    walls.point_data[FIELD] = np.tile(_fine(of_facets[facing][..., None])[:, 0], pitches)
+    walls = _mesh(moved[np.tile(facing, len(images))])
+    walls.point_data[FIELD] = np.tile(_fine(of_facets[facing][..., None])[:, 0], len(images))
     gap, contact = problem.segment.gap, state.contact is not None
     told = (
         f"walls overlap by {-state.wall_distance:.2f} mm"
@@ -65,17 +66,17 @@ def node_distances(walls: CellWalls, array: np.ndarray) -> np.ndarray:
     out = np.full(len(walls.problem.nodes), np.nan)
     for pair in walls.gaps:
         placed = [walls.positions(wall, array) for wall in pair]
-        for (facets, _), own, other in zip(pair, placed, placed[::-1]):
-            np.fmin.at(out, facets.ravel(), distances_from(other, own.reshape(-1, 3)))
+        for wall, own, other in zip(pair, placed, placed[::-1]):
+            np.fmin.at(out, wall.facets.ravel(), distances_from(other, own.reshape(-1, 3)))
     return out
 
 
-def _positions(problem, state, facets, shift):
-    """(rest, deformed) positions (facets, 6, 3) in mm of the facets of the pitch that lies `shift` mm further
-    along the body."""
-    X = problem.nodes[facets] + [shift, 0, 0]
+def _positions(problem, state, facets, turn, shift):
+    """(rest, deformed) positions (facets, 6, 3) in mm of the image by a half turn of the facets of the pitch
+    that lies `shift` mm further along the body."""
+    X = problem.nodes[facets] * turn + [shift, 0, 0]
     screw = se3.exp_pose(state.strains.twist_vector * X[..., :1])
-    local = X * [0, 1, 1] + problem.displacement(state.array)[facets]
+    local = X * [0, 1, 1] + problem.displacement(state.array)[facets] * turn
     return X, np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
 
 

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from pneunet.base import se3
 from pneunet.geometry import tags
 from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.sections import rotation
 from pneunet.hifi.fem import surface
 from pneunet.hifi.fem.agreement import gathered
 from pneunet.hifi.fem.mixed_field import MixedField
@@ -27,8 +28,14 @@ _DIVISIONS = 4
 IN_CONTACT = 0.1
 
 
-#: facets (n, 6) of nodes, and how far each lies along X1 from its own place (n,), mm
-Wall = tuple[np.ndarray, np.ndarray]
+@dataclass(frozen=True)
+class Wall:
+    """facets (n, 6) of nodes; turn (n, 3): diagonal of the rotation that takes each from its own place to the
+    cell's, shift (n,): by how much it is moved along X1 then, mm."""
+
+    facets: np.ndarray
+    shift: np.ndarray
+    turn: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -51,11 +58,11 @@ class WallDistances:
 
     def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
-        facets = surface.facet_nodes(problem, tags.OUTER)
-        corners = problem.nodes[facets[:, :3]]
+        facets = surface.wall_triangles(problem, tags.OUTER)
         self.facets, wall_of_facet, self.gaps = [], [], []
         wall = 0
         for i, (segment, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
+            corners = problem.nodes[facets[:, :3]] @ rotation(segment)  # in its own axes
             half = segment.chamber_thickness / segment.sin / 2
             centres = start + segment.chamber_positions
             for side in segment.sides:
@@ -110,32 +117,44 @@ class WallDistances:
 class CellWalls:
     """The walls of a cell's gaps, put together from the pieces that its cuts leave.
 
-    gaps: a pair of walls for each side of the body, the second facing the first across the gap; each is
-    (facets (n, 6) of nodes, shift (n,) in mm, whole pitches that bring a piece to its wall).
+    gaps: a pair of walls for each side of the body, the second facing the first across the gap. Where the
+    mesh is a part of the cell, half turns make the rest, and of gaps that they take to each other there is
+    one.
     """
 
     def __init__(self, problem: MixedField):
         self.problem, s = problem, problem.segment
-        facets = surface.facet_nodes(problem, tags.OUTER)
-        corners = problem.nodes[facets[:, :3]]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        slope = normal[:, 0] / np.linalg.norm(normal, axis=1)
-        self.gaps = []
-        for side in s.sides:
-            above = (side * corners[:, :, 2]).min(axis=1) > s.core_top - _TOLERANCE
-            along = (corners[:, :, 0] - side * s.cot * corners[:, :, 1]).mean(axis=1)
-            first, second = (np.flatnonzero(above & (sign * slope > 0.1)) for sign in (1, -1))
-            plane = along[first[0]]
-            places = ((first, plane), (second, plane + s.gap / s.sin))
-            self.gaps.append([(facets[c], s.pitch * np.round((x - along[c]) / s.pitch)) for c, x in places])
+        facets = surface.wall_triangles(problem, tags.OUTER)
+        self.gaps: list[tuple[Wall, Wall]] = []
+        pieces = []
+        for turn in problem.turns:
+            corners = problem.nodes[facets[:, :3]] * turn
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            pieces.append((corners, normal[:, 0] / np.linalg.norm(normal, axis=1)))
+        for side in s.sides if len(problem.turns) < 4 else s.sides[:1]:
+            found: list[list[np.ndarray]] = [[], []]
+            for number, (corners, slope) in enumerate(pieces):
+                above = (side * corners[:, :, 2]).min(axis=1) > s.core_top - _TOLERANCE
+                along = (corners[:, :, 0] - side * s.cot * corners[:, :, 1]).mean(axis=1)
+                for rows, sign in zip(found, (1, -1)):
+                    for f in np.flatnonzero(above & (sign * slope > 0.1)):
+                        rows.append(np.array([number, f, along[f]]))
+            first, second = (np.array(rows) for rows in found)
+            plane = first[0, 2]
+            walls = []
+            for rows, x in ((first, plane), (second, plane + s.gap / s.sin)):
+                number, f = rows[:, :2].astype(int).T
+                shift = s.pitch * np.round((x - rows[:, 2]) / s.pitch)
+                walls.append(Wall(facets[f], shift, problem.turns[number]))
+            self.gaps.append((walls[0], walls[1]))
 
     def positions(self, wall: Wall, array: np.ndarray | None = None) -> np.ndarray:
         """(n, 6, 3) deformed positions of a wall's nodes, in the section frame at X1 = 0."""
-        facets, shift = wall
         e, k = np.split(self.problem.strains.value, 2)
-        u, X = self.problem.displacement(array), self.problem.nodes[facets]
-        screw = se3.exp_pose(np.concatenate([k, e]) * (X[..., :1] + shift[:, None, None]))
-        local = X * [0, 1, 1] + u[facets]
+        u = self.problem.displacement(array)
+        X, turn = self.problem.nodes[wall.facets], wall.turn[:, None]
+        screw = se3.exp_pose(np.concatenate([k, e]) * (X * turn + wall.shift[:, None, None])[..., :1])
+        local = (X * [0, 1, 1] + u[wall.facets]) * turn
         return np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
 
     def distance(self) -> float:
@@ -148,16 +167,16 @@ class CellWalls:
         return max((self._contact(gap, pressure) for gap in self.gaps), key=lambda c: c.force)
 
     def _contact(self, gap, pressure):
-        (facets, shift), other = gap
+        (wall, other), facets = gap, gap[0].facets
         e, k = np.split(self.problem.strains.value, 2)
-        s = self.problem.nodes[facets][..., :1] + shift[:, None, None]
+        s = self.problem.nodes[facets][..., :1] + wall.shift[:, None, None]
         rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
         forces = np.einsum("...ij,...j->...i", rotation, self.problem.medium_forces()[facets]).reshape(-1, 3)
         # a node of a cut lies on both sides of it, with a share of the force on each
         _, first, inverse = np.unique(
             np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True
         )
-        forces, x = forces[first], self.positions(gap[0]).reshape(-1, 3)[first]
+        forces, x = forces[first], self.positions(wall).reshape(-1, 3)[first]
         shares = np.outer(surface.reference_areas(self.problem, facets), [0, 0, 0, 1 / 3, 1 / 3, 1 / 3])
         areas = np.bincount(inverse.ravel(), shares.ravel())
         total = np.linalg.norm(forces.sum(axis=0))

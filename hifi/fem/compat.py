@@ -56,10 +56,21 @@ def _compiler(comm: MPI.Comm) -> Iterator[None]:
             logging.disable(before)
 
 
+def _name_spacing(domain):
+    """Say of a mesh that its nodes are equally spaced, as gmsh's are said to be. ffcx does so when it has
+    compiled a form, and from then on all forms of the mesh have other names and would be compiled again."""
+    element = domain.ufl_coordinate_element()
+    if element.sub_elements()[0].variant() is None:
+        node = ufl.FiniteElement(element.family(), element.cell(), element.degree(), variant="equispaced")
+        domain._ufl_coordinate_element = ufl.VectorElement(node)
+
+
 def mixed_space(mesh: Mesh, degree: int = 2) -> fem.FunctionSpace:
-    """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure on tetrahedra."""
+    """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure; on hexahedra
+    Q."""
     with _compiler(mesh.comm):
         if OLD:
+            _name_spacing(mesh.ufl_domain())
             u = ufl.VectorElement("CG", mesh.ufl_cell(), degree)
             p = ufl.FiniteElement("CG", mesh.ufl_cell(), degree - 1)
             return fem.FunctionSpace(mesh, ufl.MixedElement([u, p]))
@@ -109,12 +120,19 @@ def scatter_add(function: fem.Function) -> None:
 
 
 class _Gmsh:
-    """What gmshio asks of a gmsh model, answered from a TetrahedralMesh: each tag a group with one part."""
+    """What gmshio asks of a gmsh model, answered from a VolumeMesh: each tag a group with one part."""
 
-    def __init__(self, content: meshfile.TetrahedralMesh):
+    #: gmsh's number, name and corners of cells and facets
+    _KINDS = {
+        "tetrahedra": {3: (4, "Tetrahedron 4", 4), 2: (2, "Triangle 3", 3)},
+        "hexahedra": {3: (5, "Hexahedron 8", 8), 2: (3, "Quadrilateral 4", 4)},
+    }
+
+    def __init__(self, content: meshfile.VolumeMesh):
         self.content, self.mesh = content, self
+        self.kinds = self._KINDS[content.element]
         self.groups = {
-            3: (content.tetrahedra, content.tetrahedron_tags),
+            3: (content.cells, content.cell_tags),
             2: (content.facets, content.facet_tags),
         }
 
@@ -133,15 +151,16 @@ class _Gmsh:
     def getElements(self, dim, tag):
         rows, tags = self.groups[dim]
         rows = rows[tags == tag] + 1
-        return [{3: 4, 2: 2}[dim]], [np.zeros(len(rows), np.int64)], [rows.ravel()]
+        return [self.kinds[dim][0]], [np.zeros(len(rows), np.int64)], [rows.ravel()]
 
     def getElementProperties(self, kind):
-        return {4: ("Tetrahedron 4", 3, 1, 4, [], 4), 2: ("Triangle 3", 2, 1, 3, [], 3)}[kind]
+        dim, (_, name, corners) = next(item for item in self.kinds.items() if item[1][0] == kind)
+        return name, dim, 1, corners, [], corners
 
 
 def read_mesh(path: Path | str, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTags]:
     """(mesh, cell tags, facet tags) of an .npz, read on rank 0 and distributed; InputError on all ranks."""
-    read: list[meshfile.TetrahedralMesh] = []
+    read: list[meshfile.VolumeMesh] = []
     on_rank_0(comm, lambda: read.append(meshfile.read_mesh(path)[0]))
     return model_to_mesh(_Gmsh(*read) if read else None, comm)
 

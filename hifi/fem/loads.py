@@ -1,5 +1,7 @@
 """Loads: each is an object with its residual; what a path sets are its `value`."""
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -10,7 +12,7 @@ from pneunet.hifi.fem.mixed_field import MixedField
 from pneunet.hifi.fem.surface import FaceQuadrature
 
 
-class AppliedLoad:
+class AppliedLoad(ABC):
     """`value` times what the load is.
 
     has_tangent: whether its residual's derivative belongs to the tangent; closed: whether that is symmetric.
@@ -25,11 +27,11 @@ class AppliedLoad:
         v, _ = ufl.split(field.test)
         return [self.value * part for part in self.parts(field, v)]
 
+    @abstractmethod
     def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
         """Residual at value = 1, tested with the displacement v."""
-        raise NotImplementedError
 
-    def update(self, field: MixedField) -> None:
+    def update(self, field: MixedField) -> None:  # noqa: B027, most have nothing to do
         """Told before the residual is assembled."""
 
 
@@ -37,13 +39,13 @@ class Pressure(AppliedLoad):
     """Follower pressure `value` (MPa) on tagged facets: -P V, so P inner(J inv(F).T N, v) in the residual.
 
     closed: the facets close a cavity, so that the load's tangent is symmetric; an open loaded patch has
-    closed = False.
+    closed = False. share: of the body's pressure, which several cavities divide.
     """
 
     has_tangent = True
 
-    def __init__(self, tags: tuple[int, ...], closed: bool = True):
-        self.tags, self.closed = tuple(tags), closed
+    def __init__(self, tags: tuple[int, ...], closed: bool = True, share: float = 1.0):
+        self.tags, self.closed, self.share = tuple(tags), closed, share
 
     def parts(self, field: MixedField, v: ufl.core.expr.Expr) -> list[ufl.Form]:
         ds, F = field.facets(*self.tags), ufl.Identity(3) + ufl.grad(field.u)

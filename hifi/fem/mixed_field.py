@@ -10,12 +10,13 @@ from petsc4py import PETSc
 from pneunet.hifi.fem import compat
 
 #: of quadrature on cells and facets: exact for pressure on facets of straight-sided cells, so that the
-#: tangent of the pressure in a closed cavity is symmetric
+#: tangent of the pressure in a closed cavity is symmetric; on hexahedra 27 and 9 Gauss points
 DEGREE = 4
 
 
 class MixedField:
-    """Taylor-Hood: quadratic displacement u, and at the vertices the pressure p that keeps the volume.
+    """Taylor-Hood: quadratic displacement u, and at the vertices the pressure p that keeps the volume; on
+    hexahedra triquadratic and trilinear.
 
     mesh, cell_tags, facet_tags: as dolfinx gives them. `state` is the present value, `test` what forms are
     tested with; arrays of the state hold owned and ghost dofs, assembled ones the owned.
@@ -23,6 +24,8 @@ class MixedField:
 
     def __init__(self, mesh: Mesh, cell_tags: compat.MeshTags, facet_tags: compat.MeshTags):
         self.mesh, self.cell_tags, self.facet_tags = mesh, cell_tags, facet_tags
+        #: "tetrahedron" or "hexahedron"
+        self.cell_name = mesh.ufl_cell().cellname()
         self.space = compat.mixed_space(mesh)
         self.state = fem.Function(self.space)
         self.u, self.p = ufl.split(self.state)
@@ -44,7 +47,7 @@ class MixedField:
         self._vector = None
 
     def node_positions(self) -> np.ndarray:
-        """(nodes, 3) of the P2 nodes this rank sees, mm, as the mesh lies now."""
+        """(nodes, 3) of the displacement nodes this rank sees, mm, as the mesh lies now."""
         return self.displacement_space.tabulate_dof_coordinates()[: len(self.displacement_dofs)].copy()
 
     # ---- the state as one array

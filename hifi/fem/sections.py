@@ -14,7 +14,7 @@ from pneunet.hifi.fem.mixed_field import MixedField
 
 class SectionFrames:
     """Frames at stations along a manipulator: best rigid fits of the channel's wall over one pitch around
-    each.
+    each, at a bulkhead over half a pitch of channel on either side of it.
 
     Surface integrals are exact for the quadratic displacement, cut at the window's ends. The base frame is
     the clamp's; the tip frame is the fit of the tip face. `stations` (n,) are undeformed arc lengths in mm.
@@ -23,21 +23,27 @@ class SectionFrames:
     def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.manipulator = problem, manipulator
         self.comm = problem.mesh.comm
-        wall = surface.facet_nodes(problem, tags.CHANNEL)
-        windows, self.segment_stations = [], []
-        for segment, start in zip(manipulator.segments, manipulator.starts):
-            s = np.arange(2 * segment.chambers - 1) * segment.pitch / 2 + start + segment.chamber_positions[0]
-            self.segment_stations.append(s[::2])
-            windows += [(x, segment.pitch) for x in s]
-            joint = start + segment.length
-            if joint < manipulator.length - 1e-9:
-                windows.append((joint, segment.pitch))
+        channels = [tags.cavity_tags(group)[1] for group in range(1, len(manipulator.groups) + 1)]
+        wall = surface.facet_nodes(problem, *channels)
+        windows, self.segment_stations, segments = [], [], manipulator.segments
+        for i, (segment, start) in enumerate(zip(segments, manipulator.starts)):
+            half, (first, last) = segment.pitch / 2, manipulator.channels[segment.group - 1]
+            if segment.chambers:
+                own = start + np.arange(2 * segment.chambers - 1) * half + segment.chamber_positions[0]
+            else:
+                own = start + np.arange(half, segment.length, half)
+                own = own[(own - half >= first) & (own + half <= last)]
+            self.segment_stations.append(own[::2])
+            windows += [(s, s - half, s + half) for s in own]
+            for following in segments[i + 1 : i + 2]:
+                joint, walls = start + segment.length, (0.0, 0.0)
+                if following.group != segment.group:
+                    walls = segment.end_wall, following.end_wall
+                windows.append((joint, joint - walls[0] - half, joint + walls[1] + half))
         windows = sorted(windows)
-        self._integrals = [
-            surface.SlabIntegral(problem, wall, s - pitch / 2, s + pitch / 2) for s, pitch in windows
-        ]
+        self._integrals = [surface.SlabIntegral(problem, wall, low, high) for _, low, high in windows]
         self._integrals.append(surface.SlabIntegral(problem, surface.facet_nodes(problem, tags.TIP)))
-        self.stations = np.array([0.0] + [s for s, _ in windows] + [manipulator.length])
+        self.stations = np.array([0.0] + [s for s, _, _ in windows] + [manipulator.length])
 
     def frames(self, array: np.ndarray | None = None) -> np.ndarray:
         """(stations, 4, 4) section frames of the current state (or of a state array); the same on all

@@ -4,21 +4,26 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from pneunet.geometry.hexahedra import gauss
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.mixed_field import MixedField
 
 #: the 4-point rule of degree 2 on the reference tetrahedron (inside the cell: vertices of re-entrant corners
-#: are singular)
+#: are singular), the 8-point Gauss rule on the hexahedron
 _A, _B = 0.5854101966249685, 0.1381966011250105
-POINTS = np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]])
+POINTS = {
+    "tetrahedron": np.array([[_B, _B, _B], [_A, _B, _B], [_B, _A, _B], [_B, _B, _A]]),
+    "hexahedron": gauss(2)[0],
+}
 
 
 class PrincipalStretch:
-    """Largest principal stretch at the 4 interior points of every cell, or of these local `cells`."""
+    """Largest principal stretch at interior points of every cell, or of these local `cells`."""
 
     def __init__(self, problem: MixedField, cells: np.ndarray | None = None):
         self.problem, mesh = problem, problem.mesh
-        self._gradient = compat.expression(mesh, problem.deformation_gradient, POINTS)
+        self._points = POINTS[problem.cell_name]
+        self._gradient = compat.expression(mesh, problem.deformation_gradient, self._points)
         self._cells = (
             np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32) if cells is None else cells
         )
@@ -28,8 +33,8 @@ class PrincipalStretch:
         self._count = self._add_up(np.ones(len(self._cells))).copy()
 
     def cellwise(self) -> np.ndarray:
-        """(owned cells, 4) largest principal stretches at the current state."""
-        F = self._gradient(self._cells).reshape(len(self._cells), len(POINTS), 3, 3)
+        """(owned cells, points) largest principal stretches at the current state."""
+        F = self._gradient(self._cells).reshape(len(self._cells), len(self._points), 3, 3)
         return np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F)[..., -1])
 
     def largest(self) -> float:

@@ -1,4 +1,12 @@
-"""Facets of a body's surface as quadratic triangles: the samples every geometric measure is made of."""
+"""Facets of a body's surface: the samples every geometric measure is made of. Quadratic triangles of
+tetrahedra, biquadratic quadrilaterals of hexahedra, told apart by their number of nodes.
+
+Nodes of a facet: its corners in turn, then the middles of its edges in turn from the first corner, of a
+quadrilateral last its own.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -6,17 +14,40 @@ from pneunet.hifi.fem.mixed_field import MixedField
 
 #: edges of dolfinx's reference tetrahedron, in the order of its P2 edge nodes 4..9
 EDGES = [(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]
-#: local P2 nodes of the facet opposite each vertex: three corners, then the mid-edges (01, 12, 20)
-FACETS = []
-for _opposite in range(4):
-    _corners = [v for v in range(4) if v != _opposite]
-    _edges = [tuple(sorted((_corners[i], _corners[(i + 1) % 3]))) for i in range(3)]
-    FACETS.append(_corners + [4 + EDGES.index(e) for e in _edges])
+
+
+#: corners of dolfinx's reference hexahedron, x running fastest
+_CUBE = np.array([(i % 2, i // 2 % 2, i // 4) for i in range(8)])
+_CUBE_EDGES = [(a, b) for a, b in combinations(range(8), 2) if np.abs(_CUBE[a] - _CUBE[b]).sum() == 1]
+_CUBE_SIDES = sorted(np.flatnonzero(_CUBE[:, i] == end).tolist() for i in range(3) for end in (0, 1))
+#: cell -> for each of its displacement nodes the corners in whose middle it lies
+VERTICES = {
+    "tetrahedron": [*((i,) for i in range(4)), *EDGES],
+    "hexahedron": [*((i,) for i in range(8)), *_CUBE_EDGES, *map(tuple, _CUBE_SIDES), tuple(range(8))],
+}
+
+
+def _facets(cell, rings):
+    """Local nodes of facets with these rings of corners: corners, middles of edges, a square's own."""
+    number = {tuple(sorted(corners)): node for node, corners in enumerate(VERTICES[cell])}
+    rows = []
+    for ring in rings:
+        edges = [number[tuple(sorted(pair))] for pair in zip(ring, [*ring[1:], ring[0]])]
+        rows.append([*ring, *edges, *([number[tuple(sorted(ring))]] if len(ring) == 4 else [])])
+    return np.array(rows)
+
+
+#: cell -> local nodes of its facets: that opposite each vertex of a tetrahedron; of a hexahedron in dolfinx's
+#: order
+FACETS = {
+    "tetrahedron": _facets("tetrahedron", [[v for v in range(4) if v != i] for i in range(4)]),
+    "hexahedron": _facets("hexahedron", [[a, b, d, c] for a, b, c, d in _CUBE_SIDES]),
+}
 
 
 def facet_nodes(problem: MixedField, *tags: int) -> np.ndarray:
-    """(facets, 6) displacement nodes of the tagged facets on this rank, corners ordered so that normals point
-    out.
+    """(facets, 6 or 9) displacement nodes of the tagged facets on this rank, corners ordered so that normals
+    point out.
 
     A facet between two cells is seen from that with the lower tag: the body's. It is reported by the rank
     that owns its cell, so that sums over ranks count it once.
@@ -27,6 +58,7 @@ def facet_nodes(problem: MixedField, *tags: int) -> np.ndarray:
     to_cell, to_facet = topology.connectivity(2, 3), topology.connectivity(3, 2)
     owned_cells = topology.index_map(3).size_local
     dofmap = problem.displacement_space.dofmap
+    local_nodes = FACETS[problem.cell_name]
     tags_of_cells = np.zeros(owned_cells + topology.index_map(3).num_ghosts, int)
     tags_of_cells[problem.cell_tags.indices] = problem.cell_tags.values
     rows = []
@@ -37,19 +69,27 @@ def facet_nodes(problem: MixedField, *tags: int) -> np.ndarray:
                 continue
             local = int(np.flatnonzero(to_facet.links(cell) == facet)[0])
             nodes = dofmap.cell_dofs(cell)
-            row = nodes[FACETS[local]]
+            row = nodes[local_nodes[local]]
             a, b, c = problem.nodes[row[:3]]
-            inside = problem.nodes[nodes[local]]
-            if np.dot(np.cross(b - a, c - a), inside - a) > 0:
-                row = row[[0, 2, 1, 5, 4, 3]]
+            if np.dot(np.cross(b - a, c - a), problem.nodes[nodes].mean(axis=0) - a) > 0:
+                row = row[KINDS[len(row)].turned]
             rows.append(row)
-    return np.array(rows, dtype=int).reshape(-1, 6)
+    return np.array(rows, dtype=int).reshape(-1, local_nodes.shape[1])
+
+
+def wall_triangles(problem: MixedField, *tags: int) -> np.ndarray:
+    """(m, 6) nodes of the tagged facets as quadratic triangles: what contact and distances see. Two of them
+    go through the nodes of a quadrilateral."""
+    facets = facet_nodes(problem, *tags)
+    if facets.shape[1] == 6:
+        return facets
+    return facets[:, [[0, 1, 2, 4, 5, 8], [0, 2, 3, 8, 6, 7]]].reshape(-1, 6)
 
 
 def reference_areas(problem: MixedField, facets: np.ndarray) -> np.ndarray:
     """(facets,) undeformed areas in mm^2."""
-    a, b, c = (problem.nodes[facets[:, i]] for i in range(3))
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    X = problem.nodes[facets[:, : KINDS[facets.shape[1]].corners]]
+    return np.linalg.norm(np.cross(X, np.roll(X, -1, axis=1)).sum(axis=1), axis=1) / 2
 
 
 # degree-4 rule on the triangle (Dunavant 1985): exact for P2 shape functions times linear coordinates
@@ -67,6 +107,64 @@ def p2_shape(barycentric: np.ndarray) -> np.ndarray:
     return np.stack(
         [a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=-1
     )
+
+
+def q2_shape(places: np.ndarray) -> np.ndarray:
+    """(..., 9) biquadratic shape functions at places (..., 2) of the unit square; corners in turn, middles of
+    edges, the middle."""
+    x = places[..., None]
+    one = np.concatenate([(1 - x) * (1 - 2 * x), 4 * x * (1 - x), x * (2 * x - 1)], axis=-1)
+    both = one[..., 0, :, None] * one[..., 1, None, :]
+    i, j = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1], [1, 1]]).T
+    return both[..., i, j]
+
+
+def _collapsed(points):
+    """(barycentric coordinates (points^2, 3), weights) of a rule on the triangle of degree 2 points - 2."""
+    x, w = np.polynomial.legendre.leggauss(points)
+    x, w = (1 + x) / 2, w / 2
+    a, b = np.meshgrid(x, x, indexing="ij")
+    places = np.stack([1 - a, a * (1 - b), a * b], axis=-1).reshape(-1, 3)
+    return places, 2 * np.outer(w * x, w).ravel()
+
+
+@dataclass(frozen=True)
+class FacetKind:
+    """corners: how many; turned: the nodes in the order of the other orientation. triangles (t, 3, 2) that
+    its reference shape is made of; barycentric (q, 3) and weights (q,) of a rule on each, exact for
+    displacement times place."""
+
+    corners: int
+    turned: list[int]
+    triangles: np.ndarray
+    barycentric: np.ndarray
+    weights: np.ndarray
+
+    def shape(self, places: np.ndarray) -> np.ndarray:
+        """(..., nodes) shape functions at reference places (..., 2)."""
+        if self.corners == 4:
+            return q2_shape(places)
+        return p2_shape(np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1))
+
+    def stretched(self, places: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """(..., q) area over reference area at places (q, 2) of facets with these corners (..., corners, 3),
+        mm2."""
+        if self.corners == 3:
+            one = np.ones(len(places))
+            slopes = [[-one, one, 0 * one], [-one, 0 * one, one]]
+        else:
+            x, y = places.T
+            slopes = [[y - 1, 1 - y, y, -y], [x - 1, -x, x, 1 - x]]
+        tangents = np.einsum("acq,...ci->a...qi", np.array(slopes), corners)
+        return np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1)
+
+
+_SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+#: nodes of a facet -> its kind
+KINDS = {
+    6: FacetKind(3, [0, 2, 1, 5, 4, 3], np.array([[[0, 0], [1, 0], [0, 1]]], float), _BARYCENTRIC, _WEIGHTS),
+    9: FacetKind(4, [0, 3, 2, 1, 7, 6, 5, 4, 8], _SQUARE[[[0, 1, 2], [0, 2, 3]]], *_collapsed(5)),
+}
 
 
 def subdivision(divisions: int) -> np.ndarray:
@@ -100,35 +198,51 @@ def _clip(polygon, values, keep_below):
 
 
 class SlabIntegral:
-    """Exact integrals over the part of a surface with low <= X1 <= high, as weights on its nodes.
+    """Integrals over the part of a surface with low <= X1 <= high, as weights on its nodes; exact where
+    facets are flat and have parallel edges.
 
     area (mm2); centre (3,) = int X dA; nodes (n,); weights (n,) = int N dA; first (n, 3) = int X N dA.
+    places (all local nodes, 3): of the nodes, when they are not the problem's own.
     """
 
-    def __init__(self, problem: MixedField, facets: np.ndarray, low: float = -np.inf, high: float = np.inf):
-        X1 = problem.nodes[facets[:, :3], 0]
+    def __init__(
+        self,
+        problem: MixedField,
+        facets: np.ndarray,
+        low: float = -np.inf,
+        high: float = np.inf,
+        places: np.ndarray | None = None,
+    ):
+        kind = KINDS[facets.shape[1]]
+        X = problem.nodes if places is None else places
+        X1 = X[facets[:, : kind.corners], 0]
         facets = facets[(X1.max(axis=1) > low) & (X1.min(axis=1) < high)]
-        corners = problem.nodes[facets[:, :3]]
-        areas = reference_areas(problem, facets)
         nodes, inverse = np.unique(facets, return_inverse=True)
         inverse = inverse.reshape(facets.shape)
         self.nodes, self.area, self.centre = nodes, 0.0, np.zeros(3)
         self.weights, self.first = np.zeros(len(nodes)), np.zeros((len(nodes), 3))
-        for row, triangle, area in zip(inverse, corners, areas):
-            polygon = np.eye(3)
-            if triangle[:, 0].min() < low:
-                polygon = _clip(polygon, triangle[:, 0] - low, keep_below=False)
-            if triangle[:, 0].max() > high:
-                polygon = _clip(polygon, triangle[:, 0] - high, keep_below=True)
-            for i in range(1, len(polygon) - 1):
-                part = polygon[[0, i, i + 1]]
-                points = _BARYCENTRIC @ part
-                w = _WEIGHTS * area * abs(np.linalg.det(part))
-                X, N = points @ triangle, p2_shape(points)
-                self.area += w.sum()
-                self.centre += w @ X
-                np.add.at(self.weights, row, w @ N)
-                np.add.at(self.first, row, np.einsum("q,qi,qn->ni", w, X, N))
+        for row, facet in zip(inverse, X[facets]):
+            for triangle in kind.triangles:
+                self._add(kind, row, facet, triangle, low, high)
+
+    def _add(self, kind, row, facet, triangle, low, high):
+        """What one triangle (3, 2) of the reference shape contributes."""
+        polygon, ends = np.eye(3), kind.shape(triangle) @ facet[:, 0]
+        if ends.min() < low:
+            polygon = _clip(polygon, ends - low, keep_below=False)
+        if ends.max() > high:
+            polygon = _clip(polygon, ends - high, keep_below=True)
+        for i in range(1, len(polygon) - 1):
+            part = polygon[[0, i, i + 1]] @ triangle
+            places = kind.barycentric @ part
+            reference = abs(np.linalg.det(part[1:] - part[0])) / 2
+            w = kind.weights * reference * kind.stretched(places, facet[: kind.corners])
+            N = kind.shape(places)
+            X = N @ facet
+            self.area += w.sum()
+            self.centre += w @ X
+            np.add.at(self.weights, row, w @ N)
+            np.add.at(self.first, row, np.einsum("q,qi,qn->ni", w, X, N))
 
     def moments(self, positions: np.ndarray) -> np.ndarray:
         """(16,) moments of the rigid fit from the undeformed surface to nodal `positions` (all local nodes,
@@ -144,8 +258,11 @@ class FaceQuadrature:
     def __init__(self, problem: MixedField, tag: int):
         self.comm = problem.mesh.comm
         self._facets = facet_nodes(problem, tag)
-        self._weights = np.outer(reference_areas(problem, self._facets), _WEIGHTS)
-        self._shape = p2_shape(_BARYCENTRIC)
+        kind = KINDS[self._facets.shape[1]]
+        places = (kind.barycentric @ kind.triangles).reshape(-1, 2)
+        corners = problem.nodes[self._facets[:, : kind.corners]]
+        self._weights = np.tile(kind.weights / 2, len(kind.triangles)) * kind.stretched(places, corners)
+        self._shape = kind.shape(places)
 
     def moments(self, positions: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         """(area, centre (3,), central second moment (3, 3) in mm^4) of the face at nodal `positions` (all

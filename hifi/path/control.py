@@ -3,13 +3,22 @@ length."""
 
 import numpy as np
 
+from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.path.system import System
 
 
 class LoadControl:
-    """The parameter is the load."""
+    """The parameter is the load: a pressure (MPa), or the share of what `share_of` says in words."""
 
     name = "load"
+
+    def __init__(self, share_of: str = ""):
+        self.share_of = share_of
+
+    def told(self, parameter: float) -> str:
+        if self.share_of:
+            return f"{100 * parameter:.4g} % of {self.share_of}"
+        return f"{parameter * KPA_PER_MPA:.4g} kPa"
 
     def satisfied(self, system: System, parameter: float) -> bool:
         return system.load == parameter
@@ -59,6 +68,9 @@ class VolumeControl(_Bordered):
     name = "volume"
     relative_tolerance = 1e-10
 
+    def told(self, parameter: float) -> str:
+        return f"{parameter:.4g} mm3"
+
     def gap(self, system: System, parameter: float) -> float:
         return system.volume() - parameter
 
@@ -81,6 +93,9 @@ class ArcLength(_Bordered):
     def __init__(self, system: System):
         self._last, self._parameter = system.positions().copy(), 0.0
         self._direction = None
+
+    def told(self, parameter: float) -> str:
+        return f"{parameter:.4g} mm"
 
     def _secant(self, system):
         if self._direction is None:  # at the start, along the tangent

@@ -164,6 +164,10 @@ class EquilibriumPath:
             self.limit_points += [found] if found else []
         return result.iterations, system.factorisations - before, result.residuals[-1]
 
+    def told(self, parameter: float) -> str:
+        """A parameter in words, with its unit."""
+        return self.control.told(parameter)
+
     def diagnosis(self) -> str:
         """What the tangent of the last accepted state says when no further step converges; '' when it has
         nothing to say.

@@ -71,6 +71,9 @@ class LoadPath(Protocol):
         """(iterations, factorisations, residual) there; NotConverged with the last accepted state
         restored."""
 
+    def told(self, parameter: float) -> str:
+        """A parameter in words, with its unit."""
+
     def diagnosis(self) -> str:
         """Words on why it cannot go on."""
 
@@ -117,8 +120,8 @@ def run_steps(
                     or "a limit point (ballooning), touching walls or a coarse mesh are the usual causes"
                 )
                 failure = ConvergenceError(
-                    f"stopped at load {path.parameter:.6g}: the next step of {attempted:.2g} did not converge"
-                    f" ({error}); results up to there are kept; {why}"
+                    f"stopped at {path.told(path.parameter)}: the next step, to {path.told(load)}, did not"
+                    f" converge ({error}); results up to there are kept; {why}"
                 )
                 failure.result = result
                 raise failure from None

@@ -54,6 +54,9 @@ class PathControl(Protocol):
 
     name: str
 
+    def told(self, parameter: float) -> str:
+        """The parameter in words, with its unit."""
+
     def satisfied(self, system: System, parameter: float) -> bool:
         """Whether its own equation holds."""
 

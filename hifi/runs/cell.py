@@ -13,6 +13,7 @@ from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CELL
 from pneunet.base.files.toml import to_table
 from pneunet.base.materials.laws import material_to_table
+from pneunet.base.system.interrupts import Interrupted
 from pneunet.base.units import KPA_PER_MPA, PER_MM_PER_M
 from pneunet.hifi.cell.file import read_cell
 from pneunet.hifi.cell.problem import CellProblem
@@ -47,9 +48,9 @@ def _solve(case, out):
         log.info(point.text)
 
     def keep(state: CellState) -> None:
-        states[:] = [state]
         rows.append(_row(state))
         write_csv(out / "cell.csv", CELL, rows)
+        states[:] = [state]
         log.info(_line(state))
 
     def touch(pressure: float) -> None:
@@ -59,11 +60,14 @@ def _solve(case, out):
             then = "beyond it states are marked 'walls overlap'"
         log.info(f"walls touch at {touched[0]:.2f} kPa; {then}")
 
-    status, facts = "reached what was asked for", {}
+    status, facts, interrupted = "reached what was asked for", {}, False
     try:
         _, facts = solve_cell(case, out / "cell.npz", keep, pass_limit_point, touch)
     except ConvergenceError as error:
         status = str(error)
+    except KeyboardInterrupt:
+        reached = states[0].pressure * KPA_PER_MPA if states else 0.0
+        status, interrupted = f"interrupted after {reached:.4g} kPa", True
     write_record(
         out,
         status=status,
@@ -76,6 +80,8 @@ def _solve(case, out):
         mesh={"mesh_size_mm": case.mesh_size, "graded": case.graded, **facts},
         wall_seconds=time.perf_counter() - started,
     )
+    if interrupted:
+        raise Interrupted(f"{status}; {len(rows)} levels are in {out}")
     if not facts:
         raise ConvergenceError(
             f"cell: {status}; {len(rows)} levels are in {out}; try less pressure or control = 'volume'"

@@ -105,14 +105,15 @@ def box(
     counts: Sequence[int],
     move: Callable[[np.ndarray], np.ndarray] | None = None,
     solid: int = 1,
+    element: CellType = CellType.tetrahedron,
 ) -> TaggedMesh:
-    """(mesh, cell tags, facet tags) of a box from the origin, each of its (nx, ny, nz) bricks cut into 6
-    tetrahedra.
+    """(mesh, cell tags, facet tags) of a box from the origin of (nx, ny, nz) hexahedra, or each of them cut
+    into 6 tetrahedra.
 
     move: X (n, 3) -> (n, 3), where its vertices go; facet tags are those of the box before. solid: tag of its
     cells.
     """
-    mesh = create_box(MPI.COMM_WORLD, [[0.0, 0.0, 0.0], list(lengths)], list(counts), CellType.tetrahedron)
+    mesh = create_box(MPI.COMM_WORLD, [[0.0, 0.0, 0.0], list(lengths)], list(counts), element)
     where, tags = [], []
     for axis, ends in enumerate(((PLANE_X, END), (PLANE_Y, END_Y), (PLANE_Z, END_Z))):
         for tag, place in zip(ends, (0.0, lengths[axis])):

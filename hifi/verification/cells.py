@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from dolfinx.mesh import CellType
 
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
@@ -35,7 +36,9 @@ class Solid:
 def held_at(problem: CellProblem, held: np.ndarray, strains: np.ndarray) -> CellState:
     """(CellState at the `strains` (6,) that are `held` (6,) bool, the others free; unknowns)."""
     system = CellSystem(problem, held, (0.0, 0.0), (REST, np.where(held, strains - REST, 0.0)))
-    path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    path = EquilibriumPath(
+        system, LoadControl("the held strains"), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
+    )
     run_steps(path, 1.0, StepSize(0.25, 1e-3))
     state = system.measure()
     system.destroy()
@@ -59,12 +62,19 @@ def torsion(
 
 
 def flexure(
-    cells: tuple[int, int] = (2, 16), pitch: float = 0.2, thickness: float = 0.07
+    cells: tuple[int, int] = (2, 16),
+    pitch: float = 0.2,
+    thickness: float = 0.07,
+    element: CellType = CellType.tetrahedron,
 ) -> list[ExactComparison]:
     """Moments of the block as a cell, its stretch free; rollers on its sides, the gauge on its top and
     bottom."""
     box = bodies.box(
-        (pitch, thickness, 1.0), (cells[0], 1, cells[1]), lambda X: X - [0, thickness / 2, 0.5], tags.BODY
+        (pitch, thickness, 1.0),
+        (cells[0], 1, cells[1]),
+        lambda X: X - [0, thickness / 2, 0.5],
+        tags.BODY,
+        element,
     )
     sides = {bodies.PLANE_Y: 1, bodies.END_Y: 1}
     problem = CellProblem(

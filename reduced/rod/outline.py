@@ -43,9 +43,8 @@ def segment_outline(segment: Segment, spacing: float = 1.0) -> tuple[np.ndarray,
     def divisions(length):
         return max(int(np.ceil(length / spacing - 1e-9)), 1)
 
-    across = divisions(s.width)
-    cube, quads = _box((divisions(s.length), 1, 1))
-    height = s.core_top - s.core_bottom
+    across, height = divisions(s.width), s.core_top - s.core_bottom
+    cube, quads = _box((divisions(s.length), across, divisions(height)))
     vertices = [cube * [s.length, s.width, height] + [0, -s.width / 2, s.core_bottom]]
     all_quads, count = [quads], len(cube)
     thickness, height = s.chamber_thickness / s.sin, s.chamber_top - s.core_top

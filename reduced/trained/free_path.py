@@ -26,8 +26,8 @@ from pneunet.reduced.trained.coordinates import (
     odd,
 )
 from pneunet.reduced.trained.gaussian import JITTER, ROWS
-from pneunet.reduced.trained.path_state import PathChain, PathState
 from pneunet.reduced.trained.side_by_side import SideBySide
+from pneunet.reduced.trained.state_on_path import PathChain, StateOnPath
 from pneunet.reduced.trained.unexplained import Unexplained
 
 #: steps over the slope that end the search, of log(leading strain): what is left after them is of third order
@@ -87,8 +87,9 @@ class FreePath:
         numbers (n, 13), P/mu (n,) > 0 and the mesh's level, (n,) or a number. A path ends at its limit load,
         or where it leaves what is known. near: which steps end the search."""
         if len(shape) > ROWS:
-            each = shape, pressure, np.broadcast_to(level, len(shape))
-            parts = [self.at(*(a[i : i + ROWS] for a in each), near) for i in range(0, len(shape), ROWS)]
+            levels, starts = np.broadcast_to(level, len(shape)), range(0, len(shape), ROWS)
+            blocks = [slice(start, start + ROWS) for start in starts]
+            parts = [self.at(shape[b], pressure[b], levels[b], near) for b in blocks]
             leads, ends, path_inputs = map(np.concatenate, zip(*parts))
             return leads, ends, path_inputs
         co, last = self.coordinates, self._last
@@ -144,8 +145,8 @@ class FreePath:
 
     def state_and_slopes(
         self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray, near: float = NEAR
-    ) -> PathState:
-        """The PathState of shape numbers (n, 13) at P/mu (n,) > 0; the rest as for `at`."""
+    ) -> StateOnPath:
+        """The StateOnPath of shape numbers (n, 13) at P/mu (n,) > 0; the rest as for `at`."""
         co, (lead, beyond, x) = self.coordinates, self.at(shape, pressure, level, near)
         overlap, overlap_by, overlap_by_lead = self.closing.overlap_and_slopes(shape, pressure, lead)
         chain = PathChain(co, shape, lead, overlap, overlap_by, overlap_by_lead)
@@ -154,7 +155,7 @@ class FreePath:
         steep = np.maximum(1 + by_lead[:, 0] * lead, FLAT)
         missing_by = -by[:, 0]
         missing_by[:, -1] += 1 / pressure
-        return PathState(chain, x, learned, by, by_lead, steep, beyond, missing_by)
+        return StateOnPath(chain, x, learned, by, by_lead, steep, beyond, missing_by)
 
     def strains_and_slopes(
         self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray

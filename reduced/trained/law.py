@@ -39,9 +39,9 @@ TIE_TOLERANCE = 0.02
 SILICONES = "strains of fitted silicones differed by up to 1.2 % at P/mu = 0.1 and 7.3 % at 0.2"
 #: of an input's range, by which dimensions may leave it that `pneunet design` has put on its edge and rounded
 ROUNDED = 1e-3
-#: far from all that was learned the deviation that inducing points give is too small by up to so much
-#: (measured: by up to 12 %), so it counts times this when it comes to doubts
-FAR = 1.06
+#: far from all that was learned the deviation that inducing points give may be too small, so it counts times
+#: this when it comes to doubts
+FAR = 1.04
 #: lowest P/mu, whose logarithm is taken
 LOWEST = 1e-9
 log = logging.getLogger(__name__)
@@ -114,16 +114,22 @@ class KindLaw:
         of log P beyond the end of their path; 0 inside."""
         pressure = np.maximum(pressure, LOWEST)
         _, beyond, there = self.path.at(shape, pressure, self.level)
-        return self._excess(self.ranged(shape, pressure), self.path.deviation(there, self._known), beyond)
+        return self.excess_there(shape, pressure, there, beyond)
+
+    def excess_there(
+        self, shape: np.ndarray, pressure: np.ndarray, there: np.ndarray, beyond: np.ndarray
+    ) -> np.ndarray:
+        """The same of free states whose path_inputs (n, d) and log P beyond the path's end (n,) are known."""
+        return self._excess(self.ranged(shape, pressure), self.path.deviation(there, self.known), beyond)
 
     @property
-    def _known(self):
+    def known(self) -> float:
         """Largest deviation, from inducing points, that counts as known."""
         return self.doubt / FAR
 
     def _excess(self, ranged, deviation, beyond):
         outside = np.maximum(np.maximum(self.low - ranged, ranged - self.high) - 1e-9, 0) / self._width
-        unknown = np.maximum(deviation / self._known - 1, 0)
+        unknown = np.maximum(deviation / self.known - 1, 0)
         return np.concatenate([outside, unknown[:, None], beyond[:, None]], axis=1)
 
     @cached_property
@@ -136,13 +142,13 @@ class KindLaw:
         pressure = np.maximum(pressure, LOWEST)
         state = self.path.state_and_slopes(shape, pressure, self.level, NEARER)
         x = self.ranged(shape, pressure)
-        deviation, by_inputs = self.path.deviation_and_slopes(state.inputs, self._known)
+        deviation, by_inputs = self.path.deviation_and_slopes(state.inputs, self.known)
         excess = self._excess(x, deviation, state.beyond)
         by = np.zeros((*excess.shape, shape.shape[1] + 1))
         if excess.any():  # mostly there is none
             side = np.sign(2 * x - self.low - self.high) * (excess[:, :-2] > 0) / self._width
             by[:, :-2] = side[:, :, None] * self.coordinates.ranged_slopes(shape, pressure)
-            by[:, -2], by[:, -1] = state.of_inputs(by_inputs) / self._known, state.beyond_by
+            by[:, -2], by[:, -1] = state.of_inputs(by_inputs) / self.known, state.beyond_by
         return state.strains_and_slopes(), (excess, by), state.closed_and_slopes()
 
 

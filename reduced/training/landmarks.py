@@ -16,6 +16,8 @@ from pneunet.reduced.trained.unexplained import Unexplained
 
 #: of the inducing points; and states that they are chosen for, drawn at random
 LANDMARKS, STATES = 350, 1000
+#: of the way from one training state to another, there or away from it
+BEYOND = 0.5
 
 
 def with_cheap_doubt(path: FreePath, x: np.ndarray) -> FreePath:
@@ -27,11 +29,14 @@ def with_cheap_doubt(path: FreePath, x: np.ndarray) -> FreePath:
 
 
 def remainder(process: GaussianProcess, x: np.ndarray) -> tuple[float, float]:
-    """(factor, power) of a GaussianProcess as FreePath has them, fitted at inputs x (n, d)."""
-    left = Unexplained(process)(x)
-    besides = process.deviation(x)[:, 0] ** 2 / process.variance[0] - left
-    logarithms = (np.log(np.maximum(part, JITTER)) for part in (left, besides))
-    power, factor = np.polyfit(*logarithms, 1)
+    """(factor, power) of a GaussianProcess as FreePath has them, fitted between and beyond random pairs of
+    inputs x (n, d): what is asked for lies between what was observed."""
+    random = np.random.default_rng(0)
+    one, other = x[random.integers(len(x), size=(2, STATES))]
+    z = one + random.uniform(-BEYOND, BEYOND, (STATES, 1)) * (other - one)
+    left = np.maximum(Unexplained(process)(z), JITTER)
+    besides = np.maximum(process.deviation(z)[:, 0] ** 2 / process.variance[0] - left, JITTER)
+    power, factor = np.polynomial.Polynomial.fit(np.log(left), np.log(besides), 1).convert().coef[::-1]
     return float(np.exp(factor)), max(float(power), 0.0)
 
 

@@ -11,6 +11,7 @@ from pneunet.base.strains import RodStrains
 from pneunet.geometry.designfile import DesignFile, body_tables, write_design_file
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced import AnalyticLaw, predict
+from pneunet.reduced.rod.prediction import segment_strains
 
 FACTOR = 0.8
 POSE = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, -3.0], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
@@ -63,18 +64,16 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
     folder.mkdir(exist_ok=True)
     manipulator = design.manipulator
     steps, centrelines, segments = [], [], []
-    for n, p in enumerate(design.pressure * reached * np.linspace(0, 1, 5)):
-        line, each = (
-            predict(manipulator, p, model, spacing=3.0),
-            [model.strains(s, p) for s in manipulator.segments],
-        )
+    for n, p in enumerate(design.largest_pressure * reached * np.linspace(0, 1, 5)):
+        line = predict(manipulator, design.scaled(p), model, spacing=3.0)
+        each = segment_strains(manipulator, design.scaled(p), model).vector
         work = (4, 2) if n else (0, 0)
         steps.append(
             [n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 0, 1 + 5 * p]
             + [0, 0, 0, 1.5 * n]
         )
         centrelines += [[n, p * 1e3, s, *point, 0, 0] for s, point in zip(line.s, line.points)]
-        segments += [[n, p * 1e3, i + 1, *one.vector, 0, 0] for i, one in enumerate(each)]
+        segments += [[n, p * 1e3, i + 1, *one, 0, 0] for i, one in enumerate(each)]
     walls = [
         [i + 1, "top" if side > 0 else "bottom", gap, s.gap, s.gap * (0.4 + 0.5 * gap / s.chambers)]
         for i, s in enumerate(manipulator.segments)
@@ -97,8 +96,9 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
                 "versions": {"dolfinx": "0.5.2"},
                 "status": "reached",
                 "contact": contact,
-                "first_touch_kPa": 0.9e3 * design.pressure * reached if overlap else None,
+                "first_touch_kPa": 0.9e3 * design.largest_pressure * reached if overlap else None,
                 "body": body_tables(manipulator),
+                "pressure_shares": list(design.shares),
                 "steps": [[1], [2]],
             }
         )
@@ -121,7 +121,7 @@ def _fields(folder, manipulator, line):
     local = rest * [0, 1, 1]
     moved = np.einsum("nij,nj->ni", poses[:, :3, :3], local) + poses[:, :3, 3]
     grid.point_data["displacement"] = moved - rest
-    grid.point_data["stretch"] = 1 + 0.1 * np.abs(rest[:, 2])
+    grid.point_data["mean_stretch"] = 1 + 0.1 * np.abs(rest[:, 2])
     grid.point_data["pressure"] = np.zeros(grid.n_points)
     facing = (rest[:, 2] > 2) & (np.abs(rest[:, 0] - 20.0) < 5)
     grid.point_data["wall_distance_mm"] = np.where(facing, 0.1 * rest[:, 1], np.nan)

@@ -8,10 +8,12 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.design.search.aims import EQ27
 from pneunet.design.search.inverse import search
 from pneunet.design.search.lookup import count_for
-from pneunet.design.target.extraction import extract
+from pneunet.design.search.possible import out_of_reach, reaches
+from pneunet.design.search.space import RANGES
+from pneunet.design.target.extraction import Extracted, extract
 from pneunet.design.target.metrics import compare
 from pneunet.design.target.target import Piece, Target
-from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.parameters import ONE_SIDED, Manipulator, Segment
 from pneunet.reduced import predict
 from tests.design.toy_law import ToyLaw
 
@@ -151,3 +153,20 @@ def test_what_cannot_be_built_is_said():
         designed(Target(line.points, pieces=pieces, vary={"angle": (10.0, 20.0)}))
     with pytest.raises(InputError, match="objective = 'best' is not known"):
         designed(Target(line.points, pieces=pieces), objective="best")
+
+
+def test_what_no_allowed_dimensions_reach_is_said():
+    law = ToyLaw()
+    target = Target(np.column_stack([10.0 * np.arange(9), np.zeros((9, 2))]), pressure_range=(0.02, 0.02))
+    like = Extracted("bending", 40.0, 0.0, 0.0, 0.0)
+    most = 0.01 / min(float(found.share(0.01, 0.0)) for found in reaches(target, like, law))
+    # the toy bends with height over the root of the base: the largest height at the thinnest base
+    heights, bases = (RANGES[ONE_SIDED][name][0] for name in ("chamber_height", "base_thickness"))
+    toy = 0.04 * 0.4 * heights[1] / 4 * (2 / bases[0]) ** 0.5
+    assert most == pytest.approx(toy / (1 + 0.04 * 0.4), rel=1e-9)
+    pieces = [replace(like, curvature=c) for c in (0.9 * most, 1.5 * most)]
+    pieces.append(Extracted("helical", 40.0, 0.03, 0.001, 0.0))
+    assert list(out_of_reach(target, pieces, law)) == [
+        "piece 2 is out of reach: it asks for 150 % of the most that allowed dimensions do at 20 kPa",
+        "piece 3 is out of reach: no allowed angle twists so much for its curvature",
+    ]

@@ -1,5 +1,7 @@
 """Pictures: the geometry behind them; that each is drawn for what it must hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,11 +9,14 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.design.report.dimensions import spread
 from pneunet.design.report.drawing import chamber_plan, section_groups, segment_table
-from pneunet.design.report.labels import plain, segment_name, significant
+from pneunet.design.report.labels import kPa, plain, segment_name, significant
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced import AnalyticLaw
 from tests.design.fake_run import HELIX, PLANE, POSE, TWIST, make_run
+
+NARROW = replace(HELIX, width=10.0, channel_width=2.0, chambers=4)
+EVERYTHING = NARROW.plain(15.0), NARROW, replace(NARROW, roll=180), replace(NARROW, roll=90, group=2)
 
 
 def test_spread_keeps_order_and_distance_and_moves_least():
@@ -31,6 +36,9 @@ def test_numbers_and_names():
         "bending 90° × 4",
         "helical 60° × 9",
     ]
+    others = PLANE.plain(12.5), replace(PLANE, roll=180)
+    assert [segment_name(s) for s in others] == ["passive 12.5 mm", "bending 90° × 4, rolled 180°"]
+    assert kPa(0.035) == "35 kPa" and kPa((0.03, 0.0)) == "30 / 0 kPa"
 
 
 def test_chamber_plan_is_thick_normal_to_the_chamber_and_turned_below():
@@ -46,7 +54,12 @@ def test_chamber_plan_is_thick_normal_to_the_chamber_and_turned_below():
 def test_equal_sections_are_drawn_once():
     taller = Segment("one-sided", 75.0, 3, chamber_height=5.0, gap=1.5)
     assert section_groups(Manipulator((TWIST, PLANE, HELIX, taller))) == [[0], [1, 2], [3]]
-    assert dict(segment_table(Manipulator((TWIST, PLANE))))["chambers"] == ["4 pairs", "4"]
+    table = dict(segment_table(Manipulator((TWIST, PLANE))))
+    assert table["chambers"] == ["4 pairs", "4"] and "pressure group" not in table
+    table = dict(segment_table(Manipulator(EVERYTHING)))
+    assert table["wall, normal"] == ["-", "1", "1", "1"] and table["length"][0] == "15"
+    assert table["roll about the axis, deg"] == ["0", "0", "180", "90"]
+    assert table["pressure group"] == ["1", "1", "1", "2"]
 
 
 @pytest.mark.parametrize(
@@ -60,6 +73,7 @@ def test_equal_sections_are_drawn_once():
             Segment("one-sided", 135.0, 20, chamber_height=5.0),
             TWIST.mirrored,
         ),
+        EVERYTHING,
     ],
 )
 def test_drawing_keeps_every_text_on_the_sheet_and_apart(segments):
@@ -115,6 +129,35 @@ def test_rendered_scale_is_the_views_scale():
     )
     rows = np.flatnonzero((image < 128).all(axis=2).any(axis=1))
     assert np.ptp(rows) * view.millimetres_per_pixel == pytest.approx(20.0, rel=0.02)
+
+
+def test_curves_in_front_lie_where_bodies_are_rendered():
+    pyvista = pytest.importorskip("pyvista")
+    from pneunet.base.pictures.rendering import render, view_of
+
+    view, place = view_of(np.array([[-30.0, 0, 0], [30, 0, 0], [0, 20, 20]])), np.array([15.0, 4, 6])
+    ball = pyvista.Sphere(radius=2.0, center=place), {"color": "black", "ambient": 1.0, "diffuse": 0.0}
+    rows, columns = np.nonzero((render(view, [ball]) < 128).all(axis=2))
+    assert view.pixels(place[None])[0] == pytest.approx([columns.mean(), rows.mean()], abs=1.0)
+
+
+@pytest.mark.parametrize("size", [(100, 10, 10), (10, 100, 50), (10, 10, 100)])
+def test_curves_in_3d_fill_their_place(size):
+    pytest.importorskip("matplotlib")
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    from pneunet.base.pictures.rendering import figure
+    from pneunet.design.report.pictures import FILLED, curve_panels
+
+    fig = figure(11.0, 6.2)
+    points = np.random.default_rng(1).random((200, 3)) * size
+    curve_panels(fig, [("target", points, "target")])
+    fig.draw_without_rendering()
+    ax = fig.axes[0]
+    x, y, _ = proj_transform(*points.T, ax.get_proj())
+    place = ax.get_position(original=True).transformed(fig.transFigure)
+    seen = np.ptp(ax.transData.transform(np.column_stack([x, y])), axis=0) / [place.width, place.height]
+    assert 0.6 * FILLED < seen.max() < FILLED
 
 
 def test_design_picture(tmp_path):

@@ -1,16 +1,19 @@
 """The report: what it says about runs whose numbers are known, whole and with parts missing."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
+from pneunet.base.materials.laws import Yeoh
 from pneunet.base.se3 import transform
 from pneunet.design.report.comparison import Comparison, overlaps, smooth, stopped_short, verdict
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.target.metrics import compare
+from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced import AnalyticLaw
 from tests.design.fake_run import FACTOR, HELIX, PLANE, POSE, make_run
 
@@ -45,6 +48,21 @@ def test_solution_that_stopped_short_is_compared_at_its_own_pressure(tmp_path):
     assert "stops at 12 kPa" in c.notes[0] and "stopped short" in verdict(run, c)
 
 
+def test_groups_are_compared_at_pressures_in_the_designs_proportions_and_rolled_strains_in_one_frame(
+    tmp_path,
+):
+    segments = PLANE, replace(PLANE, roll=180, group=2)
+    make_run(tmp_path, segments, (0.02, 0.01), reached=0.5, fields=False)
+    run, c = judged(tmp_path)
+    assert np.allclose(run.solve.strains.k, FACTOR * c.strains.k)
+    own = [AnalyticLaw().strains(PLANE, p).k[1] for p in (0.01, 0.005)]
+    assert c.strains.k[:, 1] == pytest.approx([own[0], -own[1]])
+    assert "At 10 / 5 kPa" in verdict(run, c) and "design pressure of 20 / 10 kPa" in c.notes[0]
+    path = tmp_path / "design.toml"
+    path.write_text(path.read_text().replace("[20.0, 10.0]", "[20.0, 20.0]"))
+    assert read_design_folder(tmp_path).stale
+
+
 def test_solution_of_another_body_is_left_out_and_told(tmp_path):
     make_run(tmp_path, fields=False)
     assert not read_design_folder(tmp_path).stale
@@ -65,22 +83,36 @@ def test_step_nearest_to_the_target_is_named(tmp_path):
     assert pressure in [row[0] for row in run.solve.history]
 
 
-def test_verdict_tells_agreement_contradiction_and_overlap(tmp_path):
+def test_verdict_tells_numbers_bars_and_possible_causes(tmp_path, monkeypatch):
     make_run(tmp_path / "a", (PLANE,), pressure=0.001, fields=False)
-    assert "confirms the reduced prediction" in verdict(*judged(tmp_path / "a"))
+    told = verdict(*judged(tmp_path / "a"))
+    assert f"|k| of a segment by up to {100 * (1 / FACTOR - 1):.0f} % (bar 5 %). Beyond the bar" in told
+    assert "possible causes: the mesh (2 mm; " in told and "a material" not in told
+    record = tmp_path / "a" / "solve" / "run.json"
+    record.write_text(record.read_text().replace('"ranks": 2', '"ranks": 2, "mesh_size_mm": 3.5'))
+    run, c = judged(tmp_path / "a")
+    [plain] = run.design.manipulator.segments
+    yeoh = replace(run.design, manipulator=Manipulator((replace(plain, material=Yeoh(c10=0.1, c20=0.01)),)))
+    told = verdict(replace(run, design=yeoh), c)
+    assert "a coarse mesh (3.5 mm; " in told and "does not know (Yeoh)" in told
+    monkeypatch.setattr("tests.design.fake_run.FACTOR", 0.99)
+    make_run(tmp_path / "e", (PLANE,), pressure=0.001, fields=False)
+    told = verdict(*judged(tmp_path / "e"))
+    assert "by up to 1 % (bar 5 %)" in told and "cause" not in told and "(0 %" not in told
+
+
+def test_verdict_tells_overlap(tmp_path):
     make_run(tmp_path / "b", (HELIX, HELIX), pressure=0.04, fields=False, overlap=0.2)
     run, c = judged(tmp_path / "b")
-    assert "is no test of the reduced prediction" in verdict(run, c) and verdict(run, c).startswith(
-        "NOT PROVEN"
-    )
+    assert verdict(run, c).startswith("NOT PROVEN") and "bar" not in verdict(run, c)
     assert overlaps(run) == [
         "Walls overlap from 36.00 kPa on, by up to 0.20 mm at the end; contact is not part of this solution"
     ]
     make_run(tmp_path / "d", (HELIX, HELIX), pressure=0.04, fields=False, overlap=0.01, contact=True)
     run, c = judged(tmp_path / "d")
-    assert overlaps(run) == [] and "contradicts the reduced prediction" in verdict(run, c)
+    assert overlaps(run) == [] and "Beyond the bar" in verdict(run, c)
     make_run(tmp_path / "c", (PLANE,), solve=False)
-    assert "no finite element solution confirms it yet" in verdict(*judged(tmp_path / "c"))
+    assert "there is no finite element solution to compare it with yet" in verdict(*judged(tmp_path / "c"))
 
 
 def test_an_edited_design_is_noticed(tmp_path):
@@ -203,6 +235,8 @@ def test_report_page_is_whole_and_self_contained(tmp_path):
     assert "WALLS OVERLAP in 1 of" in page and page.count("OVERLAP, not proven: Walls overlap from") == 3
     assert "mpirun -n 2 pneunet solve" in page
     assert f"{FACTOR:.3f}" in page  # FE / reduced of a curvature
+    assert page.count("<details>") == 3 and "entries" not in page and ">None<" not in page
+    assert "mean principal stretch, at most 1.4" in page and "at most 1.1 (largest_stretch" in page
 
 
 def test_report_of_a_design_alone_says_what_is_missing(tmp_path):

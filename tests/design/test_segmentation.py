@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from pneunet.base import se3
-from pneunet.design.segmentation.fit import Fit, Observations, refined
-from pneunet.design.segmentation.rod import Rod, advance
+from pneunet.design.segmentation.fit import Observations, RodFit, refined
+from pneunet.design.segmentation.rod import PiecewiseRod, advance
 from pneunet.design.segmentation.segment import fitted, segment
 from pneunet.design.segmentation.windows import arc_lengths
 from pneunet.design.target.file import SHIPPED, read_target
@@ -14,7 +14,7 @@ from pneunet.design.target.target import Piece, SplitOptions, Target
 
 PEOPLE = Path(__file__).parents[1] / "data" / "people"
 
-ROD = Rod(
+ROD = PiecewiseRod(
     se3.exp_pose(np.array([0.4, -1.0, 2.0, 5.0, -6.0, 7.0])),
     np.array([40.0, 75.0, 110.0]),
     np.array([[0.0, 0.03], [0.02, 0.0], [0.0, 0.0], [-0.015, -0.02]]),
@@ -44,13 +44,13 @@ def moved(rod, parameter, step):
     start = rod.start.copy()
     start[:3, :3] = se3.exp_rotation(x[:3]) @ start[:3, :3]
     start[:3, 3] += x[3:6]
-    return Rod(start, x[6 : 5 + n], x[5 + n :].reshape(n, 2))
+    return PiecewiseRod(start, x[6 : 5 + n], x[5 + n :].reshape(n, 2))
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-3])
 def test_slopes_agree_with_differences(scale):
     """Points and frames at given arc lengths, by every parameter; small strains go through the series."""
-    rod = Rod(ROD.start, ROD.joints, scale * ROD.strains)
+    rod = PiecewiseRod(ROD.start, ROD.joints, scale * ROD.strains)
     station = rod.at(STATIONS)
     velocities, rotations = rod.slopes(station)
     back = np.swapaxes(station.frames, 1, 2)
@@ -86,14 +86,14 @@ def observed(rod, length, noise=0.0, count=150, seed=0, frames=False):
 
 @pytest.mark.parametrize("frames", [False, True])
 def test_gradient_agrees_with_differences(frames):
-    """Of half the cost by every parameter, the feet sliding along: points, weights, frames and a fixed base."""
+    """Of half the cost by every parameter, the feet sliding along: points, weights, frames, a fixed base."""
     random = np.random.default_rng(1)
     points, seen = observed(ROD, 150.0, noise=0.5, frames=frames)
     base = ROD.start[:3, :3] @ se3.exp_rotation(np.array([0.02, 0.01, -0.03]))
-    weights = random.uniform(0.5, 1.5, len(points))
-    data = Observations(points, 0.3, 150.0, frames=seen, base=base, weights=weights, shortest=37.0)
-    rod = Rod(ROD.start, ROD.joints + 1.0, ROD.strains * 1.02)
-    fit = Fit(data, rod, np.ones((4, 2), bool), np.linspace(0, 150, len(points)))
+    more = {"frames": seen, "base": base, "weights": random.uniform(0.5, 1.5, 150), "shortest": 37.0}
+    data = Observations(points, 0.3, np.linspace(0, 150, 150), **more)
+    rod = PiecewiseRod(ROD.start, ROD.joints + 1.0, ROD.strains * 1.02)
+    fit = RodFit(data, rod, np.ones((4, 2), bool), np.linspace(0, 150, len(points)))
 
     def settled(at):
         for _ in range(60):
@@ -112,12 +112,12 @@ def test_gradient_agrees_with_differences(frames):
 
 
 def test_standard_errors_are_those_of_repeated_noise():
-    rod = Rod(ROD.start, np.array([60.0]), np.array([[0.0, 0.02], [0.015, 0.01]]))
+    rod = PiecewiseRod(ROD.start, np.array([60.0]), np.array([[0.0, 0.02], [0.015, 0.01]]))
     off = []
     for seed in range(40):
         points, _ = observed(rod, 130.0, noise=0.3, count=80, seed=seed)
-        free = np.array([[False, True], [True, True]])
-        fit = refined(Fit(Observations(points, 0.3, 130.0), rod, free, np.linspace(0, 130, 80)), 40, 1e-4)
+        free, s = np.array([[False, True], [True, True]]), np.linspace(0, 130, 80)
+        fit = refined(RodFit(Observations(points, 0.3, s), rod, free, s), 40, 1e-4)
         errors = np.sqrt(np.diag(fit.covariance))[-3:]
         off.append((fit.rod.strains[free] - rod.strains[free]) / errors)
     assert np.mean(np.array(off) ** 2) == pytest.approx(1.0, abs=0.35)  # 120 numbers, some correlated
@@ -166,7 +166,7 @@ def test_curves_of_people(name, wanted):
 
 
 #: bending, twisting by 1.2 rad, helical, bent to the other side
-MIXED = Rod(
+MIXED = PiecewiseRod(
     ROD.start,
     np.array([50.0, 90.0, 150.0]),
     np.array([[0.0, 0.025], [0.03, 0.0], [-0.02, 0.02], [0.0, -0.03]]),
@@ -195,7 +195,9 @@ def test_the_curve_moved_mirrored_and_reversed():
     assert kinds(back) == kinds(split)[::-1] and lengths(back) == pytest.approx(lengths(split)[::-1], abs=0.3)
 
 
-TWIST_FIRST = Rod(np.eye(4), np.array([50.0, 80.0]), np.array([[0.0314, 0.0], [0.0, 0.018], [0.035, 0.0349]]))
+TWIST_FIRST = PiecewiseRod(
+    np.eye(4), np.array([50.0, 80.0]), np.array([[0.0314, 0.0], [0.0, 0.018], [0.035, 0.0349]])
+)
 
 
 def test_frames_or_a_fixed_base_show_a_twist_at_the_end():
@@ -243,8 +245,8 @@ def test_what_cannot_be_reached_is_given_up_and_that_is_said():
 
 
 def test_pieces_that_are_too_short_or_too_many_are_given_up():
-    corner = np.vstack([np.linspace([0, 0, 0], [60, 0, 0], 30), np.linspace([60, 2, 0], [60, 60, 0], 30)])
-    split = segment(Target(corner))
+    kink = PiecewiseRod(np.eye(4), np.array([50.0, 58.0]), np.array([[0.0, 0.0], [0.0, 0.15], [0.0, 0.0]]))
+    split = segment(target_of(kink, 108.0, noise=0.1, count=60))
     assert min(lengths(split)) > 19 and any("not followed" in note for note in split.notes)
     split = segment(target_of(MIXED, 200.0), options=SplitOptions(most_pieces=2))
     assert len(split.pieces) == 2 and any("most that are allowed" in note for note in split.notes)
@@ -294,7 +296,7 @@ def test_the_criterion_prefers_the_true_split():
     target = target_of(MIXED, 200.0, noise=0.2)
     fit, _ = fitted(target)
     more = refined(
-        Fit(fit.data, fit.rod.cut(np.array([25.0])), np.insert(fit.free, 0, fit.free[0], axis=0), fit.feet)
+        RodFit(fit.data, fit.rod.cut(np.array([25.0])), np.insert(fit.free, 0, fit.free[0], axis=0), fit.feet)
     )
     fewer, _ = fitted(target, SplitOptions(most_pieces=3))
     assert fit.criterion < replace(fewer, data=fit.data).criterion - 10 and fit.criterion < more.criterion - 5

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
+from pneunet.design.inverse_design import inverse_design
 from pneunet.design.target.casting import Casting
 from pneunet.design.target.file import read_target
 from pneunet.design.target.points import strides
@@ -129,6 +130,11 @@ def test_strides_see_a_curve_behind_its_noise():
 def test_curves_that_no_body_follows(points, words):
     with pytest.raises(InputError, match=words):
         Target(points)
+
+
+def test_a_straight_line_leaves_nothing_to_inflate():
+    with pytest.raises(InputError, match="the curve is straight and no twist is asked for"):
+        inverse_design(Target(POINTS))
 
 
 def test_half_a_million_rows_are_refused_at_once(tmp_path):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import NeoHookean
 from pneunet.base.strains import RodStrains
 from pneunet.design.target.reach import Reach, reach
 from pneunet.design.workspace import WorkspaceCase, _picks, _shares, workspace
@@ -31,6 +32,20 @@ def test_tips_are_those_of_predictions():
 def test_what_has_no_equilibrium_is_left_out_and_counted():
     found = workspace(WorkspaceCase(**SMALL | {"shapes": 800}), law=ToyLaw(limit=0.015))
     assert found.lost == 399 and all((c.pressures == 0.01).all() for c in found.clouds)
+
+
+def test_what_the_law_doubts_is_marked_and_told(caplog):
+    case = WorkspaceCase(
+        **SMALL | {"chains": ((ONE_SIDED,),), "pressures": (0.03, 0.05)}, material=NeoHookean(0.12)
+    )
+    with caplog.at_level("WARNING"):
+        found = workspace(case)
+    # the law was taught P/mu up to 0.32: 0.05/0.12 is 0.42
+    assert found.doubted[ONE_SIDED][:, 1].all() and not found.doubted[ONE_SIDED][:, 0].all()
+    (cloud,) = found.clouds
+    assert cloud.doubted[cloud.pressures == 0.05].all()
+    assert "pressure / mu = 0.417 is outside the trained law's" in caplog.text
+    assert not workspace(WorkspaceCase(**SMALL), law=ToyLaw()).clouds[1].doubted.any()
 
 
 def test_picks_are_all_combinations_or_spread_evenly():

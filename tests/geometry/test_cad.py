@@ -110,6 +110,30 @@ def test_a_manipulator_is_the_sum_of_its_segments_and_the_channel_through_the_jo
     assert body + cavity == pytest.approx(sum(map(outer_volume, segments)), rel=1e-9)
 
 
+def test_rolled_passive_and_grouped_segments_add_up_too():
+    """The second group's cavity ends with its own cells; a passive segment is core, and channel but for what
+    closes its end."""
+    narrow = replace(ONE_SIDED, width=10.0, channel_width=2.0)
+    segments = [narrow.plain(9.0), narrow, replace(narrow, roll=90)]
+    twist = replace(TWISTING, width=10.0, channel_width=2.0, roll=90, group=2)
+    segments += [replace(narrow, angle=120.0, roll=180, group=2), twist]
+    with cad.session():
+        volumes = cad.build(Manipulator(segments))
+        tops = {}
+        for _, tag in gmsh.model.getPhysicalGroups(3):
+            boxes = [gmsh.model.getBoundingBox(3, v) for v in gmsh.model.getEntitiesForPhysicalGroup(3, tag)]
+            tops[tag - tags.BODY] = [
+                f(b[i] for b in boxes) for f, i in ((min, 1), (min, 2), (max, 4), (max, 5))
+            ]
+    cavities = sum(map(cavity_volume, segments[1:])) + (9.0 - 2.0) * 2.0 * 2.0
+    cavities += sum(joint_volume(s) for s in (narrow, narrow, narrow, segments[3], twist))
+    assert volumes["cavity_mm3"] == pytest.approx(cavities, rel=1e-9)
+    outer = sum(map(outer_volume, segments))
+    assert volumes["body_mm3"] + volumes["cavity_mm3"] == pytest.approx(outer, rel=1e-9)
+    expected = {0: (-5, -3, 5, 2), 1: (-5, -3, 5, 6), 2: (-6, -5, 3, 5), 3: (-5, -6, 5, 3), 4: (-7, -5, 7, 5)}
+    assert tops == {i: pytest.approx(bounds, abs=1e-5) for i, bounds in expected.items()}
+
+
 @pytest.mark.parametrize("name", ["one_sided_w10", "twist_w12"])
 def test_mirror_designs_have_equal_volumes(name):
     s = CASES[name](angle=50.0, chambers=3)

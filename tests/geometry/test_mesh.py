@@ -61,7 +61,29 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
     assert np.ptp(z[~on_side], axis=1) == pytest.approx(0.0, abs=1e-9)
     ends = first.chamber_positions[0] - first.pitch / 2, BOTH.length - last.end_wall
     assert (x.min(), x.max()) == pytest.approx(ends)
-    assert set(stored.tetrahedron_tags) == {tags.BODY, tags.BODY + 1}
+    assert set(stored.cell_tags) == {tags.BODY, tags.BODY + 1}
+
+
+def test_each_pressure_group_has_a_closed_cavity_between_bulkheads(tmp_path):
+    """As large as the CAD's, by the divergence theorem on its own faces; the channels end where the
+    parameters say."""
+    bend = replace(ONE_SIDED, angle=90.0, chambers=1)
+    other = replace(bend, roll=180, group=2)
+    body = Manipulator((bend, other, other.plain(8.0)))
+    facts = mesh.mesh_manipulator(body, 4.0, tmp_path)
+    stored, _ = read_mesh(tmp_path / MESH)
+    total = 0.0
+    for group, ends in enumerate(body.channels, start=1):
+        facets = stored.points[np.concatenate([stored.tagged(tag) for tag in tags.cavity_tags(group)])]
+        normals = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0]) / 2
+        total += abs(np.einsum("nk,nk->", facets.mean(axis=1), normals) / 3)
+        channel = stored.points[stored.tagged(tags.cavity_tags(group)[1])]
+        assert (channel[..., 0].min(), channel[..., 0].max()) == pytest.approx(tuple(ends))
+        assert abs(channel[..., 1]).max() == pytest.approx(2.0)
+        assert np.sign(facets[..., 2].sum()) == (1 if group == 1 else -1)  # chambers above, and below
+    assert total == pytest.approx(facts["cavity_mm3"])
+    assert set(facts["areas"]) == {f"{name}_mm2" for name in tags.face_names(2).values()}
+    assert min(facts["areas"].values()) > 0
 
 
 def test_the_same_mesh_again(meshed, tmp_path):

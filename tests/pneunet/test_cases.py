@@ -1,5 +1,5 @@
-"""The engine of studies and campaigns, with cases that really crash, hang and eat memory, on one, two and
-three ranks."""
+"""The engine of studies and campaigns, with cases that really crash, hang and eat memory, on one rank, and
+on three, of which one hands out."""
 
 import importlib
 import json
@@ -15,6 +15,7 @@ import pytest
 from pneunet.hifi.runs.campaign.file import read_campaign
 from pneunet.hifi.runs.case_process import FUNCTIONS
 from pneunet.hifi.runs.study.file import read_study
+from tests.pneunet.sayings import said
 from tests.toy_cases import ENDINGS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,7 +42,7 @@ def is_alive(number):
     return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", [1, 3])
 def test_every_way_to_end_is_recorded_and_stops_no_other_case(tmp_path, ranks):
     directory = tmp_path / "cases"
     progress, records = run(ranks, directory, "endings")
@@ -97,7 +98,8 @@ def test_an_interrupted_run_ends_in_order_and_the_next_goes_on(tmp_path, ranks):
     told = process.communicate(timeout=60)[1]
     finished = len(list(directory.glob("*/record.json")))
     assert process.returncode == 130 and 2 <= finished < 8
-    assert told.splitlines()[-1].startswith(f"pneunet: interrupted: {finished} of 8 cases are finished")
+    [line] = said(told)
+    assert line.startswith(f"pneunet: interrupted: {finished} of 8 cases are finished")
     assert all(not path.name.startswith(".") for path in directory.iterdir())
     _, records = run(ranks, directory, "naps")
     assert {r["status"] for r in records} == {"done"}

@@ -4,14 +4,17 @@ agree."""
 import csv
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pneunet.base.files.schemas import CELL as CELL_COLUMNS
 from pneunet.base.files.schemas import CENTRELINE, CENTRELINES, POINT, SEGMENTS, SHAPES, STEPS
 from pneunet.geometry.cad.mesh import segment_tables
 from pneunet.geometry.designfile import read_design_file
@@ -78,7 +81,7 @@ def test_every_command_has_its_help(command, tmp_path):
 
 def test_design_writes_what_it_found(folder):
     run = folder / "run 1"
-    names = {"design.toml", "target.csv", "centreline.csv", "design.png", "run.json"}
+    names = {"design.toml", "target.csv", "split.toml", "centreline.csv", "design.png", "run.json"}
     assert names <= {p.name for p in run.iterdir()}
     design = read_design_file(run / "design.toml")
     assert design.pressure == pytest.approx(0.040) and len(design.manipulator.segments) == 1
@@ -195,12 +198,12 @@ def test_paraview_files_hold_the_fields(folder):
     reader = pyvista.get_reader(out / "solution.pvd")
     reader.set_active_time_value(reader.time_values[-1])
     grid = reader.read()[0]
-    assert {"displacement", "pressure", "stretch"} <= set(grid.point_data)
+    assert {"displacement", "pressure", "mean_stretch"} <= set(grid.point_data)
     u, x = grid["displacement"], grid.points[:, 0]
     assert abs(u[x < 1e-6]).max() < 1e-6
     on_tip = x > x.max() - 1e-6
     assert (grid.points + u)[on_tip].mean(axis=0) == pytest.approx(steps[-1, 5:8], abs=0.3)
-    assert 1.0 < grid["stretch"].max() <= steps[-1, STEPS.index("largest_stretch")]
+    assert 1.0 < grid["mean_stretch"].max() <= steps[-1, STEPS.index("largest_stretch")]
     distance = grid["wall_distance_mm"]
     assert np.nanmin(distance) == pytest.approx(steps[-1, 8]) and 0 < np.isfinite(distance).sum() < 0.5 * len(
         distance
@@ -208,7 +211,7 @@ def test_paraview_files_hold_the_fields(folder):
     assert abs(grid["pressure"]).max() > 0.005
     assert grid.n_points > 0 and (grid.celltypes == pyvista.CellType.QUADRATIC_TETRA).all()
     rest = pyvista.read(out / listed[0].get("file"))
-    assert abs(rest["displacement"]).max() == 0.0 and rest["stretch"] == pytest.approx(1.0)
+    assert abs(rest["displacement"]).max() == 0.0 and rest["mean_stretch"] == pytest.approx(1.0)
 
 
 def test_two_ranks_give_the_same_result(folder):
@@ -277,3 +280,33 @@ def test_fit_material_as_typed(tmp_path):
     out = tmp_path / "out" / "fit-pull"
     assert {p.name for p in out.iterdir()} == {"material.toml", "fit.png"}
     assert (out / "material.toml").read_text().startswith('[material]\nlaw = "neo-Hookean"\nmu_MPa = 0.2\n')
+
+
+CELL = """pressure_kPa = 100
+levels = 200
+mesh_size_mm = 6
+contact = "none"
+[material]
+mu_MPa = 0.3
+[segment]
+kind = "one-sided"
+angle_deg = 90
+"""
+
+
+def test_an_interrupted_cell_keeps_its_levels_and_says_where(tmp_path):
+    (tmp_path / "c.toml").write_text(CELL)
+    line, rows = [PNEUNET, "cell", "c.toml"], tmp_path / "cell" / "cell.csv"
+    process = subprocess.Popen(
+        line, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 200
+    while not rows.exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[1]
+    record = json.loads((tmp_path / "cell" / "run.json").read_text())
+    reached = table(rows, CELL_COLUMNS)[:, CELL_COLUMNS.index("pressure_kPa")][-1]
+    assert process.returncode == 130 and record["status"] == f"interrupted after {reached:.4g} kPa"
+    assert told.startswith(f"pneunet: {record['status']}; ") and len(told.splitlines()) == 1
+    assert not list((tmp_path / "cell").glob(".*"))

@@ -19,6 +19,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.files.schemas import CENTRELINES, SEGMENTS, STEPS
 from pneunet.hifi.verification.reference_case import DATA
+from tests.pneunet.sayings import said
 
 SOLVE = ["solve", str(DATA / "reference.toml"), "--pressure-kPa", "35"]
 #: pneunet with so many bytes a file may have, writing more fails as on a full disk; MPI's own files come
@@ -48,7 +49,7 @@ def solve(folder, *options, ranks=1, limit=None):
     ]
     if ranks > 1:
         command = [sys.executable, "-m", "pneunet", "run", "-n", str(ranks), "--", *command]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=DATA.parent.parent)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=DATA.parent.parent)
 
 
 def reached(folder):
@@ -134,12 +135,9 @@ def test_a_rank_that_dies_ends_the_run_and_the_next_goes_on(whole, tmp_path, whi
     os.kill(ranks_of(process.pid)[which], signal.SIGKILL)
     told = process.communicate(timeout=30)[1]  # no deadlock
     assert process.returncode == 137
-    last = told.splitlines()[-1]  # Open MPI 5 frames a notice of its own before it
-    assert (
-        "a rank was stopped by signal 9" in last
-        and "--resume goes on" in last
-        and len(told.splitlines()) <= 6
-    )
+    [line] = said(told)
+    assert "a rank was stopped by signal 9" in line and "--resume goes on" in line
+    assert "Traceback" not in told
     assert 2 <= reached(tmp_path) < reached(whole)
     done = solve(tmp_path, "--resume", ranks=2)
     assert done.returncode == 0, done.stderr
@@ -169,9 +167,7 @@ def test_a_killed_run_ends_at_the_same_result(whole, killed, tmp_path, ranks):
     assert readable(folder) == pytest.approx(readable(whole))
 
 
-@pytest.mark.parametrize(
-    ("ranks", "number"), [(1, signal.SIGINT), (1, signal.SIGTERM), (2, signal.SIGINT), (2, signal.SIGTERM)]
-)
+@pytest.mark.parametrize(("ranks", "number"), [(1, signal.SIGTERM), (2, signal.SIGINT)])
 def test_an_interrupted_run_says_where_and_the_next_goes_on(whole, tmp_path, ranks, number):
     """The signal is the launcher's alone; a second run in the folder is refused meanwhile."""
     shutil.copytree(whole / "mesh", tmp_path / "mesh")
@@ -189,7 +185,8 @@ def test_an_interrupted_run_says_where_and_the_next_goes_on(whole, tmp_path, ran
     record = json.loads((tmp_path / "solve" / "run.json").read_text())
     at = f"interrupted at {record['pressure_reached_kPa']:.3g} kPa"
     assert process.returncode == 130 and record["status"] == at
-    assert told.splitlines()[-1].startswith(f"pneunet: {at}; the result up to there is in")
+    [line] = said(told)
+    assert line.startswith(f"pneunet: {at}; the result up to there is in")
     assert not list((tmp_path / "solve").glob(".*"))
     step = reached(tmp_path)
     assert f"resumed after step {step}" in solve(tmp_path, "--resume", "--no-fields").stdout
@@ -251,7 +248,8 @@ def test_a_mesh_is_data(whole, tmp_path):
     assert not obeyed.exists()
     stored.write_bytes(stored.read_bytes()[:-2000])
     told = solve(tmp_path, "--no-fields", "--pressure-kPa", "1", ranks=2)
-    assert told.returncode == 2 and told.stderr.count("\n") == 1 and str(stored) in told.stderr
+    [line] = said(told.stderr)
+    assert told.returncode == 2 and str(stored) in line and "Traceback" not in told.stderr
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,4 @@
-"""`pneunet workspace` on several ranks: the same shapes as in one process, in files that say what they
-hold."""
+"""`pneunet workspace` on several ranks: the same shapes as in one process, and files that say so."""
 
 import csv
 import subprocess

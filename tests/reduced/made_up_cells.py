@@ -37,11 +37,11 @@ def true_stiffness(kind, shape, P):
     return K
 
 
-def made_up_data():
+def made_up_data(designs=DESIGNS):
     rng = np.random.default_rng(4)
     rows = {f.name: [] for f in columns()}
     for number, kind in enumerate(KINDS):
-        for design in range(DESIGNS):
+        for design in range(designs):
             v = rng.uniform(
                 [45, 1.5, 0.6, 0.25, 0.15, 0.12, 0.3, 0.3, 0.25],
                 [90, 2.5, 1.2, 0.4, 0.25, 0.25, 0.6, 0.6, 0.35],

@@ -6,6 +6,7 @@ import pytest
 from pneunet.reduced.trained import gaussian
 from pneunet.reduced.trained.along_inputs import AlongInputs
 from pneunet.reduced.trained.gaussian import JITTER, TREND
+from pneunet.reduced.trained.unexplained import Unexplained
 from pneunet.reduced.training.regression import NEAR, FitSettings, Slopes, _misfit, _spread_over, fit
 
 
@@ -115,6 +116,24 @@ def test_the_deviation_is_what_observations_and_slopes_leave_of_the_weights(monk
     assert process.deviation(new) ** 2 / process.variance == pytest.approx(
         np.column_stack([spread, spread]), rel=1e-3, abs=1e-6
     )
+
+
+def test_what_inducing_points_leave_open_is_no_less_for_some_of_them_and_has_its_slopes():
+    x, y, group = observed(60)
+    process, new, h = fit(x, y, group), 1.2 * observed(30, seed=1)[0], 1e-5
+    z = (np.vstack([process.inducing, (new - process.shift) / process.width])) @ process.metric
+    prior = np.exp(-0.5 * ((z[:, None] - z) ** 2).sum(axis=2))
+    K, k = prior[:60, :60] + JITTER * np.eye(60), prior[:60, 60:]
+    left, some = Unexplained(process), Unexplained(process, np.arange(0, 60, 4))
+    assert left(new) == pytest.approx(1 - (k * np.linalg.solve(K, k)).sum(axis=0), abs=1e-7)
+    assert (some(new) >= left(new) - 1e-9).all() and some(new).max() > 2 * left(new).max()
+    value, slopes = some.with_slopes(new)
+    assert (value == some(new)).all() and some(new[:1]) == pytest.approx(value[:1], rel=1e-6)
+    for i in range(2):
+        step = h * np.eye(2)[i]
+        assert (some(new + step) - some(new - step)) / (2 * h) == pytest.approx(
+            slopes[:, i], rel=1e-4, abs=1e-7
+        )
 
 
 def test_few_inducing_points_serve_many_observations_and_slopes_are_exact():

@@ -7,10 +7,11 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.dataset import write_dataset
-from pneunet.base.materials.laws import Yeoh
+from pneunet.base.materials.laws import NeoHookean, Yeoh
 from pneunet.base.strains import MIRROR
 from pneunet.geometry.parameters import KINDS, ONE_SIDED, TWISTING
 from pneunet.geometry.shape_numbers import shape_numbers
+from pneunet.reduced.rod.states import VARIABLES
 from pneunet.reduced.trained.coordinates import REST
 from pneunet.reduced.trained.file import read_law
 from pneunet.reduced.trained.law import TrainedLaw
@@ -88,6 +89,47 @@ def test_slopes_of_the_free_strains(trained, kind):
                 p[0] += sign * h
             ends.append(law.free_strains(s, p)[0])
         assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(slopes[0, :, i], rel=1e-4, abs=1e-7)
+
+
+def test_each_with_slopes_has_the_derivatives_of_many_segments_by_dimensions_pressure_and_modulus(trained):
+    """Also of how far they lie outside: by pressure, by an input, and because nothing near is known."""
+    law, P = trained[0], np.array([0.03, 0.05, 0.16, 0.05])
+    law = replace(law, kinds=law.kinds | {TWISTING: replace(law.kinds[TWISTING], doubt=2e-4)})
+    far = replace(design(TWISTING, 50.0), width=20.0, top_wall=2.2, side_wall=2.2)
+    segments = [design(ONE_SIDED, 120.0, pitch=7.0), design(TWISTING), design(ONE_SIDED), far]
+    found = law.each_with_slopes(segments, P)
+    assert found.strains == pytest.approx(law.each(segments, P).vector, rel=1e-4)
+    for excess, segment, pressure in zip(found.excess, segments, P):
+        one = law.excess(segment, pressure)
+        assert excess[: len(one)] == pytest.approx(one, abs=1e-5) and not excess[len(one) :].any()
+    assert not found.excess[0].any() and (found.excess[2:] > 0).any(axis=1).all()
+    assert (found.excess[3] > 0).sum() > 2 and found.excess[3, -2] > 0
+    for i, name in enumerate(VARIABLES):
+        ends, steps = [], []
+        for sign in (1, -1):
+            pairs = [changed_by(name, s, p, sign * 1e-4) for s, p in zip(segments, P)]
+            steps.append([change for _, _, change in pairs])
+            ends.append(law.each_with_slopes([s for s, _, _ in pairs], [p for _, p, _ in pairs]))
+        width = np.subtract(*steps)
+        for what in ("strains", "excess", "closed"):
+            slope = (getattr(ends[0], what) - getattr(ends[1], what)).T / width
+            size = 1e-4 * abs(getattr(found, f"{what}_by")).max()
+            assert slope.T == pytest.approx(getattr(found, f"{what}_by")[..., i], rel=1e-4, abs=size), name
+
+
+def changed_by(name, segment, pressure, part):
+    """(Segment, pressure, change) with one of VARIABLES larger by so much of itself, where there is such a
+    segment."""
+    if name == "pressure":
+        return segment, pressure * (1 + part), pressure * part
+    if name == "mu":
+        mu = segment.material.mu
+        return replace(segment, material=NeoHookean(mu=mu * (1 + part))), pressure, mu * part
+    value = getattr(segment, name)
+    try:
+        return replace(segment, **{name: value * (1 + part)}), pressure, value * part
+    except InputError:  # the cavity's floor lies as high as the channel allows
+        return segment, pressure, 0.0
 
 
 def test_held_out_figures_of_an_easy_law_are_small_and_its_intervals_honest(trained):

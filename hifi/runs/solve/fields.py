@@ -10,22 +10,29 @@ from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.agreement import gathered, on_rank_0
-from pneunet.hifi.fem.surface import EDGES
+from pneunet.hifi.fem.surface import VERTICES
 from pneunet.hifi.runs.solve.goal import Goal
 from pneunet.hifi.runs.solve.tables import Tables
 
-QUADRATIC_TETRA = 24
-#: dolfinx's P2 node order -> VTK's
-TO_VTK = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
+#: cell -> VTK's number of it, and dolfinx's node order -> VTK's: quadratic tetrahedra, triquadratic hexahedra
+VTK = {
+    "tetrahedron": (24, [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]),
+    "hexahedron": (
+        29,
+        [0, 1, 3, 2, 4, 5, 7, 6]
+        + [8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 15, 14]
+        + [22, 23, 21, 24, 20, 25, 26],
+    ),
+}
 
 
 class FieldWriter:
     """Gathers fields on rank 0 and writes them with VTK, so that files are the same for any number of ranks.
 
-    At points: displacement (mm), pressure (the multiplier, MPa), stretch (largest principal) and
-    wall_distance_mm, on facing walls the signed distance from the wall opposite and nan elsewhere; as field
-    data the marks of hifi.contact.touch. Each .vtu appears by rename when it is whole, and only then in
-    solution.pvd: a killed run leaves valid files.
+    At points: displacement (mm), pressure (the multiplier, MPa), mean_stretch (largest principal, mean of the
+    cells around a node) and wall_distance_mm, on facing walls the signed distance from the wall opposite and
+    nan elsewhere; as field data the marks of hifi.contact.touch. Each .vtu appears by rename when it is
+    whole, and only then in solution.pvd: a killed run leaves valid files.
     """
 
     def __init__(self, directory: Path, solve: ManipulatorSolve, goal: Goal) -> None:
@@ -56,15 +63,14 @@ class FieldWriter:
                 old.unlink()
 
     def _pressure_at_nodes(self):
-        """Multiplier at the P2 nodes: corner values, averaged on mid-edges. One value per local displacement
-        node."""
+        """Multiplier at the displacement nodes: corner values, elsewhere the mean of the corners around. One
+        value per local displacement node."""
         corner = self.problem.pressure_field()
         p2 = compat.cell_dofs(self.problem.displacement_space)
         p1 = compat.cell_dofs(self.problem.pressure_space)
         out = np.zeros(len(self.problem.nodes))
-        out[p2[:, :4]] = corner[p1]
-        for i, (a, b) in enumerate(EDGES):
-            out[p2[:, 4 + i]] = (corner[p1[:, a]] + corner[p1[:, b]]) / 2
+        for node, around in enumerate(VERTICES[self.problem.cell_name]):
+            out[p2[:, node]] = corner[p1[:, list(around)]].mean(axis=1)
         return out
 
     def _wall_distance(self):
@@ -80,7 +86,7 @@ class FieldWriter:
         fields = {
             "displacement": self.problem.displacement()[: self._owned],
             "pressure": self._pressure_at_nodes()[: self._owned],
-            "stretch": self.stretch.nodal()[: self._owned],
+            "mean_stretch": self.stretch.nodal()[: self._owned],
         }
         fields = {name: gathered(self.comm, values) for name, values in fields.items()} | {
             "wall_distance_mm": self._wall_distance()
@@ -90,10 +96,9 @@ class FieldWriter:
     def _save(self, fields, m):
         import pyvista
 
-        cells = np.hstack([np.full((len(self._cells), 1), 10), self._cells[:, TO_VTK]])
-        grid = pyvista.UnstructuredGrid(
-            cells.ravel(), np.full(len(cells), QUADRATIC_TETRA, np.uint8), self._points
-        )
+        kind, order = VTK[self.problem.cell_name]
+        cells = np.hstack([np.full((len(self._cells), 1), len(order)), self._cells[:, order]])
+        grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), kind, np.uint8), self._points)
         for name, values in fields.items():
             grid.point_data[name] = values.astype(np.float32)
         for name, value in m.touch.marks.items():

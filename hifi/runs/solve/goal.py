@@ -78,16 +78,6 @@ class Goal:
         step."""
         return pressure_kPa if self.control == "pressure" and not self.dead else step
 
-    def where(self, stage: str, parameter: float) -> str:
-        """The place on the path in words."""
-        if stage == DEAD_LOADS:
-            return f"{parameter * 100:.4g} % of the dead loads"
-        return (
-            f"{parameter * KPA_PER_MPA:.4g} kPa"
-            if stage == "pressure"
-            else f"{parameter:.4g} {'mm3' if stage == 'volume' else 'mm'}"
-        )
-
     def plan(self) -> str:
         """What will be walked, in words."""
         inflation = f"{self.key} to {self.value:g}"
@@ -99,13 +89,14 @@ class Goal:
             else inflation
         )
 
-    def done(self, m: Measured, stage: str, parameter: float) -> str:
-        """The last line's beginning, of the last state, and what makes it doubtful."""
+    def done(self, m: Measured, stage: str, reached: str) -> str:
+        """The last line's beginning, of the last state, `reached` in words, and what makes it doubtful."""
         pressure = f" at {m.pressure * KPA_PER_MPA:.4g} kPa" * (stage in ("volume", "arc length"))
-        return f"done: {self.where(stage, parameter)}{pressure}" + f"; {m.touch.text}" * bool(m.touch.text)
+        return f"done: {reached}{pressure}" + f"; {m.touch.text}" * bool(m.touch.text)
 
-    def failure(self, m: Measured, stage: str, parameter: float, result: StepResult, out: Path) -> str:
-        """Why the run ended short of its goal, where its data are, and what to try; m: its last state."""
+    def failure(self, m: Measured, stage: str, reached: str, result: StepResult, out: Path) -> str:
+        """Why the run ended short of its goal, where its data are, and what to try; m: its last state,
+        `reached` in words."""
         if stage == DEAD_LOADS:
             why, remedy = "buckling or too coarse a mesh", "smaller [loads] or a smaller mesh_size_mm"
         else:
@@ -118,7 +109,7 @@ class Goal:
         what = "[loads] were" if stage == DEAD_LOADS else f"{self.key} = {self.value:g} was"
         overlap = f" ({m.touch.text})" * bool(m.touch.text)
         return (
-            f"{what} not reached: stopped at {self.where(stage, parameter)} ({result.reason}),"
+            f"{what} not reached: stopped at {reached} ({result.reason}),"
             f" {result.diagnosis or f'usually by {why}'}; the result up to there is in {out}{overlap}; try"
             f" {remedy}"
         )

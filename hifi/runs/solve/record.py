@@ -66,7 +66,7 @@ class Record:
             timings=newton.timings,
             newton=vars(newton.options),
             versions=versions(),
-            failed_attempts=[[self.goal.where(self.solve.stage, at), why] for at, why in failures],
+            failed_attempts=[[self.solve.path.told(at), why] for at, why in failures],
             stability_factorisations=sum(row["stability_factorisations"] for row in history),
             steps=history,
         )

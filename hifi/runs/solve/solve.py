@@ -9,7 +9,7 @@ from typing import Protocol
 
 from mpi4py import MPI
 
-from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.errors import ConvergenceError, InputError, located
 from pneunet.base.files.atomic import room_in
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.reading import read_json
@@ -32,6 +32,8 @@ from pneunet.hifi.runs.solve.tables import Tables
 
 log = logging.getLogger(__name__)
 
+#: of a run's identity: what its run.json tells
+KEPT = ("loads", "body", "mesh_size_mm", "pressure_shares")
 #: what to do after a full disk
 RESUME = " and go on with pneunet solve --resume"
 
@@ -74,19 +76,26 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     identity = {
         "body": body_tables(design.manipulator),
         "mesh_size_mm": mesh_size,
+        "element": design.element,
         "loads": design.loads.table(),
         "base": design.base_pose.tolist() if design.loads else None,
         "control": goal.control,
         "contact": design.contact,
+        **({"pressure_shares": list(design.shares)} if len(design.shares) > 1 else {}),
     }
     mesh, kept = on_rank_0(comm, lambda: _prepare(design, directory, mesh_size, identity, resume))
     loads = design.loads.in_body(design.base_pose)
     penalty = WallPenalty() if design.contact == "auto" else None
-    solve = ManipulatorSolve(design.manipulator, mesh_path, comm, loads=loads, contact=penalty)
-    tables, writer = Tables(comm, out, solve.walls.gaps), FieldWriter(out, solve, goal) if fields else None
+    log.info("solve: set up; forms that are new to this machine are compiled, up to a minute")
+    solve = ManipulatorSolve(
+        design.manipulator, mesh_path, comm, loads=loads, contact=penalty, shares=design.shares
+    )
+    tables = Tables(comm, out, solve.walls.gaps, design.shares)
+    writer = FieldWriter(out, solve, goal) if fields else None
     log.info(
-        f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (P2/P1), {comm.size}"
-        f" rank{'s' * (comm.size > 1)}, {goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
+        f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (Taylor-Hood), {comm.size}"
+        f" rank{'s' * (comm.size > 1)}, {goal.plan()}{_proportions(design)}; set up in"
+        f" {time.perf_counter() - started:.1f} s"
     )
     before, last, complete = None, None, False
     if kept:
@@ -104,7 +113,7 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
         solve.destroy()
         return last
     about = {
-        **{name: identity[name] for name in ("loads", "body", "mesh_size_mm")},
+        **{name: value for name, value in identity.items() if name in KEPT},
         "mesh": mesh,
         "cells": mesh["cells"],
         "resumed_after_step": before and before.number,
@@ -117,8 +126,8 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
         told.accepted(solve.measure())
     result = StepResult() if complete else _walk(solve, goal, told, record, milestones, before)
     last, status = told.last, f"reached the {goal.noun} asked for"
+    reached = solve.path.told(solve.path.parameter)
     if result.reason:
-        reached = goal.where(solve.stage, solve.path.parameter)
         status = f"stopped at {reached} of {goal.key} = {goal.value:g}: {result.reason}"
     elif "tip_stiffness" in missing:
         extras["tip_stiffness"] = tip.stiffness(solve)
@@ -126,16 +135,22 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
         record.finished(status, last, result.failures)
     solve.destroy()
     if result.reason:
-        raise ConvergenceError(goal.failure(last, solve.stage, solve.path.parameter, result, out))
+        raise ConvergenceError(goal.failure(last, solve.stage, reached, result, out))
     if "blocked_force" in missing:
         log.info("blocked force: the same body with its tip held")
-        held = design.manipulator, mesh_path, last.pressure, loads, comm, penalty
+        held = design.manipulator, mesh_path, last.pressure, loads, comm, penalty, design.shares
         extras["blocked_force"] = tip.blocked_force(*held)
         with room_in(out, RESUME):
             record.finished(status, last, result.failures)
-    ending = goal.done(last, solve.stage, solve.path.parameter)
+    ending = goal.done(last, solve.stage, reached)
     log.info("; ".join([ending, *(point.text for point in last.limit_points), f"results in {out}"]))
     return last
+
+
+def _proportions(design):
+    """Of the pressures of several groups, to be read behind the plan."""
+    told = " : ".join(f"{share:.4g}" for share in design.shares)
+    return f" (pressure groups in the proportions {told})" * (len(design.shares) > 1)
 
 
 def _walk(solve, goal, told, record, milestones, before):
@@ -146,7 +161,7 @@ def _walk(solve, goal, told, record, milestones, before):
         with deferred():
             return solve.run(target, told.accepted, milestones, before=before, control=goal.control)
     except Interrupted:
-        status = f"interrupted at {goal.where(solve.stage, solve.path.parameter)}"
+        status = f"interrupted at {solve.path.told(solve.path.parameter)}"
         with room_in(record.directory, RESUME):
             record.finished(status, told.last)
         text = f"{status}; the result up to there is in {record.directory}: --resume goes on from it"
@@ -180,7 +195,7 @@ def _go_on(kept, solve, goal, tables, out):
         raise InputError(
             f"{out / CHECKPOINT}: has passed {goal.key} = {goal.value:g} already: solve without --resume"
         )
-    log.info(f"resumed after step {step.number} at {goal.where(solve.stage, step.load)}")
+    log.info(f"resumed after step {step.number} at {solve.path.told(step.load)}")
     return step, measured
 
 
@@ -207,14 +222,21 @@ def _mesh(design, folder, mesh_size):
     """Facts of the design's mesh in `folder`, which is made where there is none."""
     from pneunet.geometry.cad.mesh import mesh_manipulator, segment_tables
 
-    wanted = {"mesh_size_mm": mesh_size, "segments": segment_tables(design.manipulator)}
+    wanted = {
+        "element": design.element,
+        "mesh_size_mm": mesh_size,
+        "segments": segment_tables(design.manipulator),
+    }
     if (folder / MESH).exists():
-        _, facts = read_mesh(folder / MESH)
+        mesh, facts = read_mesh(folder / MESH)
         if wanted == {name: facts.get(name) for name in wanted} and facts == _facts_for_people(folder):
+            body = design.manipulator
+            with located(folder / MESH):
+                mesh.require_tags([s.layer_thickness > 0 for s in body.segments], len(body.groups))
             return facts
     if folder.is_dir() and any(folder.glob("m*")):
         log.info(f"{folder}: no {MESH} of this body and mesh size with its mesh.json: meshed anew")
-    return mesh_manipulator(design.manipulator, mesh_size, folder)
+    return mesh_manipulator(design.manipulator, mesh_size, folder, design.element)
 
 
 def _facts_for_people(folder):

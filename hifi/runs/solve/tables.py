@@ -1,5 +1,6 @@
 """Tables of a solve: one row, or block of rows, for each accepted step."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,17 @@ COLUMNS = {"steps": STEPS, "centrelines": CENTRELINES, "segments": SEGMENTS}
 
 class Tables:
     """CSV files of a run, rewritten whole after every accepted step so that a kill leaves them valid; their
-    rows are known to rank 0 alone. gaps: (segment, side, number, width in mm) of each row of walls.csv."""
+    rows are known to rank 0 alone. gaps: (segment, side, number, width in mm) of each row of walls.csv;
+    shares: of the pressure in each group's cavity, which several groups have as further columns of
+    steps.csv."""
 
-    def __init__(self, comm: MPI.Comm, directory: Path, gaps: list[tuple]) -> None:
+    def __init__(
+        self, comm: MPI.Comm, directory: Path, gaps: list[tuple], shares: Sequence[float] = (1.0,)
+    ) -> None:
         self.comm, self.directory, self.gaps = comm, directory, gaps
+        self.shares = shares if len(shares) > 1 else ()
+        of_groups = tuple(f"pressure_{group}_kPa" for group in range(1, len(self.shares) + 1))
+        self.columns = COLUMNS | {"steps": STEPS + of_groups}
         self.rows: dict[str, list] = {name: [] for name in COLUMNS}
 
     def resume(self, last: int) -> list[tuple]:
@@ -33,7 +41,7 @@ class Tables:
         return on_rank_0(self.comm, lambda: self._read(last))
 
     def _read(self, last: int) -> list[tuple]:
-        for name, columns in COLUMNS.items():
+        for name, columns in self.columns.items():
             path = self.directory / f"{name}.csv"
             header, rows = read_csv(path)
             if tuple(header) != columns:
@@ -73,11 +81,12 @@ class Tables:
         row = [*at, m.iterations, m.factorisations, m.volume, *tip]
         row += [touch.wall_distance, marks[0], touch.body_distance, marks[1], touch.contact_force]
         row += [m.largest_stretch, m.unstable, m.dead_loads, m.stability_factorisations, m.seconds]
+        row += [m.pressure * share * KPA_PER_MPA for share in self.shares]
         self.rows["steps"].append(row)
         self.rows["centrelines"] += [[*at, s, *g[:3, 3], *marks] for s, g in zip(m.stations, m.frames)]
         strains = enumerate(zip(m.strains.e, m.strains.k), start=1)
         self.rows["segments"] += [[*at, i, *e, *k, *marks] for i, (e, k) in strains]
-        for name, columns in COLUMNS.items():
+        for name, columns in self.columns.items():
             write_csv(self.directory / f"{name}.csv", columns, self.rows[name])
         walls = [[*gap, distance] for gap, distance in zip(self.gaps, m.walls)]
         write_csv(self.directory / "walls.csv", WALLS, walls)

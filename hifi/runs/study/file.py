@@ -8,6 +8,7 @@ can be varied.
 import copy
 import itertools
 import json
+import logging
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +25,7 @@ from pneunet.geometry.parameters import Segment
 from pneunet.hifi.cell.file import cell_from_tables, cell_tables
 from pneunet.hifi.runs.cases import Case, case_limits
 
+log = logging.getLogger(__name__)
 BODIES = ("cell", "segment", "manipulator")
 SEGMENT_KEYS = list(quantities(Segment))
 MATERIAL_KEYS = ["silicone", "law"] + sorted(
@@ -37,6 +39,8 @@ CELL_KEYS = (*COMMON_KEYS, "control", "volume_factor")
 
 #: in one study; so many are read in seconds
 MOST_CASES = 10_000
+#: takes more than a second
+MANY_CASES = 500
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,8 @@ def read_study(path: str | Path) -> Study:
         raise InputError(
             f"{where}: {count} cases are more than the {MOST_CASES} of one study: vary less, or coarser"
         )
+    if count > MANY_CASES:
+        log.info(f"{where}: {count} cases are put together")
     cases = []
     for row in listed:
         for combination in itertools.product(*grid.values()):

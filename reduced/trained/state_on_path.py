@@ -42,7 +42,7 @@ class PathChain:
 
 
 @dataclass(frozen=True)
-class PathState:
+class StateOnPath:
     """n free states. chain: with their shapes and leading strains; inputs (n, d): their path_inputs; learned
     (n, p): what is learned there, by (n, p, 14) and by_lead (n, p): how it changes at a leading strain and
     with it; steep (n,): d log P/d log(leading strain); beyond (n,): log P beyond the path's end, missing_by

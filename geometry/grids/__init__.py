@@ -1,0 +1,1 @@
+"""Grids of hexahedra for cells and manipulators: sheared tensor grids, numpy alone."""
