@@ -21,9 +21,10 @@ def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> b
 
     The problem's own state is as before. Needs pyvista and matplotlib.
     """
-    from pneunet.base.pictures.rendering import edges
+    from pneunet.base.pictures.rendering import edges, load_vtk
     from pneunet.base.pictures.walls import FIELD, TOUCHING, draw_walls
 
+    load_vtk()
     kept = problem.strains.value.copy()
     problem.strains.value[:] = state.strains.vector
     try:
