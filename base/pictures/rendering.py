@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from pneunet.base.files.atomic import atomic_path, write_text
-from pneunet.base.system.interrupts import deferred, is_interrupted
 
 PIXELS = (900, 720)
 #: points (n, 3) in mm and matplotlib's keywords of a curve that is drawn in front of all bodies
@@ -52,16 +51,6 @@ def save_vtk(mesh: Any, path: str | Path) -> None:
     writer.WriteToOutputStringOn()  # VTK itself crashes on a full disk
     writer.Write()
     write_text(path, writer.GetOutputString())
-
-
-def load_vtk() -> None:
-    """Load pyvista before it is used. Interrupted while it loads VTK, it would lose the signal or crash: the
-    signal is heeded at the end."""
-    with deferred():
-        import pyvista  # noqa: F401
-
-        if is_interrupted():
-            raise KeyboardInterrupt
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import pytest
 
 from pneunet.base.files.atomic import temporary_beside
 from pneunet.base.files.folder import leave_all, output_folder
-from pneunet.base.pictures.rendering import load_vtk
 from pneunet.base.system.interrupts import SAME_SECONDS, deferred, handled, is_interrupted, kept
+from pneunet.base.system.libraries import load_vtk
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
