@@ -65,7 +65,9 @@ def inverse_design(
         log.info(f"  {text}")
     found = search(target, asked.pieces, law, objective)
     best = found.best
-    content = DesignFile(best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose)
+    content = DesignFile(
+        best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose, loads=target.loads
+    )
     effort = {
         "inputs": {"target": target.source or target.name, "objective": objective},
         "evaluations": found.evaluations,
@@ -85,6 +87,7 @@ def inverse_design(
             "active_bounds": list(found.active),
             "flush_underside_costs_mm": round(found.flush_costs, 4),
             "target_error": design.errors.table() if design.errors else {},
+            "shape_error": [e.table() for e in design.further_errors],
             "tolerances": spread.table(),
             "alternative": [_table(c) for c in found.alternatives],
             "piece": [
@@ -165,6 +168,9 @@ def summary(design: Design) -> Iterator[str]:
     if design.errors:
         yield "errors of the reduced prediction:"
         yield from ("  " + text for text in design.errors.lines())
+    for i, e in enumerate(design.further_errors, start=1):
+        told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
+        yield f"shape {i} at {KPA_PER_MPA * design.target.shapes[i - 1].pressures[0]:.2f} kPa: {told}"
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from pneunet.design.chain import solve_cell as solve_cell
     from pneunet.design.design import Design as Design
     from pneunet.design.inverse_design import inverse_design as inverse_design
+    from pneunet.design.measured.comparison import MeasuredComparison as MeasuredComparison
+    from pneunet.design.measured.comparison import compare as compare
     from pneunet.design.report.rundata import Solution as Solution
     from pneunet.design.target.casting import Casting as Casting
     from pneunet.design.target.shapes import TargetShape as TargetShape
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from pneunet.front import rod as rod
     from pneunet.front import segment as segment
     from pneunet.geometry.loading import DeadLoads as DeadLoads
+    from pneunet.geometry.moulds.parameters import Moulds as Moulds
     from pneunet.geometry.parameters import Manipulator as Manipulator
     from pneunet.geometry.parameters import Segment as Segment
     from pneunet.reduced.rod.centreline import Centreline as Centreline
@@ -59,6 +62,8 @@ _PLACES = {
     "Design": "design.design",
     "InputError": "base.errors",
     "Manipulator": "geometry.parameters",
+    "MeasuredComparison": "design.measured.comparison",
+    "Moulds": "geometry.moulds.parameters",
     "Results": "base.files.results",
     "Rod": "reduced.rod.rod",
     "RodPiece": "reduced.rod.rod",
@@ -69,6 +74,7 @@ _PLACES = {
     "TargetShape": "design.target.shapes",
     "TipPoints": "design.target.shapes",
     "Workspace": "design.workspace",
+    "compare": "design.measured.comparison",
     "inverse_design": "design.inverse_design",
     "loads": "front",
     "material": "front",

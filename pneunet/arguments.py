@@ -160,6 +160,12 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
     add_output(a, "the design's folder")
 
+    a = add("export", "everything to cast it: STEP and STL of body and moulds, a sheet for the workshop")
+    a("design", type=path)
+    text = "printer, draft, clearances, ...; default: a bed of 220 mm and straight walls"
+    a("--moulds", type=path, metavar="MOULDS.toml", help=text)
+    add_output(a, "the design's folder; the pack is in its folder workshop")
+
     text = "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml"
     a = add("solve", text)
     a("design", type=path)
@@ -214,6 +220,20 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a = add("report", "one HTML page: target, reduced prediction and finite elements side by side")
     a("directory", type=path)
     add_law(a, None)
+
+    a = add(
+        "compare", "a measurement over pressure beside its prediction, and the modulus that it speaks for"
+    )
+    a("run", type=path, metavar="RUN", help="a design's folder, or its design.toml")
+    text = "markers, tip, centreline, angle or displacement over pressure (docs/use-compare.md)"
+    a("measured", type=path, metavar="MEASURED.csv", help=text)
+    text = "where markers sit on the body at rest: marker, x_mm, y_mm, z_mm"
+    a("--markers", type=path, metavar="MARKERS.csv", help=text)
+    a("--fit-wall", action="store_true", help="fit the thickness of the walls beside the modulus")
+    text = "the coordinates are the target's already: register nothing"
+    a("--as-is", action="store_true", help=text)
+    add_law(a, None)
+    add_output(a, "compare/ in the design's folder")
 
     a = add("fit-material", "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
     a("test", type=path, metavar="TENSILE.csv")

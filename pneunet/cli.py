@@ -48,6 +48,12 @@ def mesh(a: Namespace) -> None:
     mesh_design(a.design, a.output or a.design.parent, a.mesh_size_mm)
 
 
+def export(a: Namespace) -> None:
+    from pneunet.front import read_design
+
+    read_design(a.design).export(a.output or a.design.parent, a.moulds)
+
+
 def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
@@ -113,6 +119,12 @@ def report(a: Namespace) -> None:
     write(a.directory, a.law)
 
 
+def compare(a: Namespace) -> None:
+    from pneunet.design.measured.comparison import run_compare
+
+    run_compare(a.run, a.measured, a.output, a.markers, a.fit_wall, a.as_is, a.law)
+
+
 def fit_material(a: Namespace) -> None:
     from pneunet.base.materials.fit_run import run_fit
 
@@ -136,6 +148,7 @@ COMMANDS = {
     "shape": shape,
     "workspace": workspace,
     "mesh": mesh,
+    "export": export,
     "solve": solve,
     "cell": cell,
     "study": study,
@@ -143,6 +156,7 @@ COMMANDS = {
     "suggest": suggest,
     "train": train,
     "report": report,
+    "compare": compare,
     "fit-material": fit_material,
     "run": run,
     "doctor": doctor,

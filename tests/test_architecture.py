@@ -24,7 +24,7 @@ FLOORS = {
 #: what lies in the package itself
 ROOMS = {
     "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
-    "geometry": [{""}, {"grids"}, {"cad"}],
+    "geometry": [{""}, {"grids", "moulds"}, {"cad"}],
     "hifi": [
         {"fem"},
         {"path"},
@@ -36,7 +36,7 @@ ROOMS = {
         {"verification"},
     ],
     "reduced": [{"rod"}, {"analytic", "trained"}, {""}, {"training"}],
-    "design": [{"target"}, {"segmentation"}, {"search"}, {"report"}, {""}],
+    "design": [{"target"}, {"segmentation"}, {"search"}, {"report"}, {"workshop"}, {""}, {"measured"}],
 }
 #: what only these packages' modules may import; all else (matplotlib, pyvista) is for the inside of functions
 SOLVERS = {"dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"}
@@ -53,7 +53,7 @@ CHAIN = "design/chain.py"
 NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
-BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
+BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL", "trimesh", "manifold3d"}
 BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:

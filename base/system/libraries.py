@@ -15,6 +15,7 @@ _PICTURES = "install it with: pip install 'pneunet[pictures]'"
 MISSING = {
     **dict.fromkeys(("dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"), _SOLVERS),
     **dict.fromkeys(("pyvista", "vtk", "vtkmodules", "matplotlib", "PIL"), _PICTURES),
+    **dict.fromkeys(("trimesh", "manifold3d"), "install it with: pip install 'pneunet[moulds]'"),
     **dict.fromkeys(("fcntl", "resource"), "this runs on Linux alone; elsewhere use the container image"),
     "gmsh": "install it with: pip install gmsh (in a checkout on Debian: make setup)",
 }

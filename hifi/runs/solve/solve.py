@@ -94,7 +94,8 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     writer = FieldWriter(out, solve, goal) if fields else None
     log.info(
         f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (Taylor-Hood), {comm.size}"
-        f" rank{'s' * (comm.size > 1)}, {goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
+        f" rank{'s' * (comm.size > 1)}, {goal.plan()}{_proportions(design)}; set up in"
+        f" {time.perf_counter() - started:.1f} s"
     )
     before, last, complete = None, None, False
     if kept:
@@ -144,6 +145,12 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     ending = goal.done(last, solve.stage, reached)
     log.info("; ".join([ending, *(point.text for point in last.limit_points), f"results in {out}"]))
     return last
+
+
+def _proportions(design):
+    """Of the pressures of several groups, to be read behind the plan."""
+    told = " : ".join(f"{share:.4g}" for share in design.shares)
+    return f" (pressure groups in the proportions {told})" * (len(design.shares) > 1)
 
 
 def _walk(solve, goal, told, record, milestones, before):
