@@ -15,12 +15,16 @@ from pathlib import Path
 from benchmarks import (
     cell,
     chain,
+    compare,
     contact,
     contact_page,
     door,
+    doubt,
+    grids,
     house,
     kills,
     law,
+    moulds,
     paper,
     paper_page,
     people,
@@ -60,6 +64,8 @@ PARTS = {
         "lines of Python, time of the import, type errors, the wheel's test; 3 minutes",
     ),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
+    "grids": (grids.made, "grids of 10,000 random segments and 500 random manipulators; some 4 minutes"),
+    "cell-grids": (grids.cells, "cells of both kinds on grids of hexahedra: errors, cost; some 10 minutes"),
     "segments": (
         segments.against_segments,
         "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes",
@@ -76,7 +82,15 @@ PARTS = {
             " some seconds"
         ),
     ),
+    "doubt": (
+        doubt.doubt,
+        "the law's doubt: cost, agreement with the exact deviation; `pneunet shape` of the demo; a minute",
+    ),
     "workspace": (workspace.hundred_thousand, "100,000 shapes of one to three segments; some seconds"),
+    "moulds": (
+        moulds.moulds,
+        "moulds of 20 random bodies by a second kernel: closed, no undercut, the body they leave; a minute",
+    ),
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
@@ -86,6 +100,10 @@ PARTS = {
         "the split of 200 random targets against the pieces that they are made of; some 30 seconds",
     ),
     "people": (people.people, "files as people bring them against the right answer of each; some minutes"),
+    "compare": (
+        compare.compare,
+        "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
+    ),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "remeshed": (
         remeshed.remeshed,

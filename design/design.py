@@ -107,7 +107,7 @@ class Design:
     @property
     def followed(self) -> bool:
         """Whether the prediction follows all of the target; true without one."""
-        return self.errors is None or not self.errors.not_followed
+        return not any(e.not_followed for e in (self.errors, *self.further_errors) if e)
 
     @property
     def manipulator(self) -> Manipulator:
@@ -134,6 +134,12 @@ class Design:
     def errors(self) -> Errors | None:
         """How far the prediction is from the target; None without one."""
         return None if self.target is None else compare(self.prediction.points, self.target.curve)
+
+    @cached_property
+    def further_errors(self) -> tuple[Errors, ...]:
+        """How far the predictions are from the target's further shapes."""
+        shapes = () if self.target is None else self.target.shapes
+        return tuple(compare(line.points, s.curve) for line, s in zip(self.further_predictions, shapes))
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:

@@ -85,6 +85,7 @@ def inverse_design(
             "active_bounds": list(found.active),
             "flush_underside_costs_mm": round(found.flush_costs, 4),
             "target_error": design.errors.table() if design.errors else {},
+            "shape_error": [e.table() for e in design.further_errors],
             "tolerances": spread.table(),
             "alternative": [_table(c) for c in found.alternatives],
             "piece": [
@@ -110,7 +111,7 @@ def as_target(target: Target | str | Path | np.ndarray) -> Target:
     """A Target from itself, from its file or from points (n, 3) in mm; InputError for one that cannot be."""
     if isinstance(target, Target):
         return target
-    return Target.read(target) if isinstance(target, str | Path) else Target(np.asarray(target, float))
+    return Target.read(target) if isinstance(target, str | Path) else Target(target)
 
 
 def run_design(
@@ -165,6 +166,9 @@ def summary(design: Design) -> Iterator[str]:
     if design.errors:
         yield "errors of the reduced prediction:"
         yield from ("  " + text for text in design.errors.lines())
+    for i, e in enumerate(design.further_errors, start=1):
+        told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
+        yield f"shape {i} at {KPA_PER_MPA * design.target.shapes[i - 1].pressures[0]:.2f} kPa: {told}"
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from pneunet.design.chain import solve_cell as solve_cell
     from pneunet.design.design import Design as Design
     from pneunet.design.inverse_design import inverse_design as inverse_design
+    from pneunet.design.measured.comparison import MeasuredComparison as MeasuredComparison
+    from pneunet.design.measured.comparison import compare as compare
     from pneunet.design.report.rundata import Solution as Solution
     from pneunet.design.target.casting import Casting as Casting
     from pneunet.design.target.shapes import TargetShape as TargetShape
@@ -60,6 +62,7 @@ _PLACES = {
     "Design": "design.design",
     "InputError": "base.errors",
     "Manipulator": "geometry.parameters",
+    "MeasuredComparison": "design.measured.comparison",
     "Moulds": "geometry.moulds.parameters",
     "Results": "base.files.results",
     "Rod": "reduced.rod.rod",
@@ -71,6 +74,7 @@ _PLACES = {
     "TargetShape": "design.target.shapes",
     "TipPoints": "design.target.shapes",
     "Workspace": "design.workspace",
+    "compare": "design.measured.comparison",
     "inverse_design": "design.inverse_design",
     "loads": "front",
     "material": "front",

@@ -43,6 +43,8 @@ def real(text: str) -> float:
 
 def path(text: str) -> Path:
     """A name that a file can have."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name is empty: a variable that is not set?")
     if not text.isprintable() or max(len(part.encode()) for part in Path(text).parts or ("",)) > 255:
         raise argparse.ArgumentTypeError("no file is called so: control characters, or over 255 in a name")
     if len(text) > 3000:
@@ -58,7 +60,8 @@ def pressures(text: str, least: float = math.ulp(0.0)) -> list[float]:
         if math.isnan(value):
             raise argparse.ArgumentTypeError(f"'{word}' is not a number; write for instance 10,20,30")
         if not least <= value <= LARGEST_PRESSURE_KPA:
-            raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
+            allowed = f"0..{LARGEST_PRESSURE_KPA:g} kPa" + ", 0 left out" * bool(least)
+            raise argparse.ArgumentTypeError(f"{value:g} must lie in {allowed}")
         values.append(value)
     return values
 
@@ -217,6 +220,20 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a = add("report", "one HTML page: target, reduced prediction and finite elements side by side")
     a("directory", type=path)
     add_law(a, None)
+
+    a = add(
+        "compare", "a measurement over pressure beside its prediction, and the modulus that it speaks for"
+    )
+    a("run", type=path, metavar="RUN", help="a design's folder, or its design.toml")
+    text = "markers, tip, centreline, angle or displacement over pressure (docs/use-compare.md)"
+    a("measured", type=path, metavar="MEASURED.csv", help=text)
+    text = "where markers sit on the body at rest: marker, x_mm, y_mm, z_mm"
+    a("--markers", type=path, metavar="MARKERS.csv", help=text)
+    a("--fit-wall", action="store_true", help="fit the thickness of the walls beside the modulus")
+    text = "the coordinates are the target's already: register nothing"
+    a("--as-is", action="store_true", help=text)
+    add_law(a, None)
+    add_output(a, "compare/ in the design's folder")
 
     a = add("fit-material", "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
     a("test", type=path, metavar="TENSILE.csv")

@@ -119,6 +119,12 @@ def report(a: Namespace) -> None:
     write(a.directory, a.law)
 
 
+def compare(a: Namespace) -> None:
+    from pneunet.design.measured.comparison import run_compare
+
+    run_compare(a.run, a.measured, a.output, a.markers, a.fit_wall, a.as_is, a.law)
+
+
 def fit_material(a: Namespace) -> None:
     from pneunet.base.materials.fit_run import run_fit
 
@@ -150,6 +156,7 @@ COMMANDS = {
     "suggest": suggest,
     "train": train,
     "report": report,
+    "compare": compare,
     "fit-material": fit_material,
     "run": run,
     "doctor": doctor,

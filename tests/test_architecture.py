@@ -36,7 +36,7 @@ ROOMS = {
         {"verification"},
     ],
     "reduced": [{"rod"}, {"analytic", "trained"}, {""}, {"training"}],
-    "design": [{"target"}, {"segmentation"}, {"search"}, {"report"}, {"workshop"}, {""}],
+    "design": [{"target"}, {"segmentation"}, {"search"}, {"report"}, {"workshop"}, {""}, {"measured"}],
 }
 #: what only these packages' modules may import; all else (matplotlib, pyvista) is for the inside of functions
 SOLVERS = {"dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"}

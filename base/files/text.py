@@ -28,7 +28,7 @@ _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?", re.ASCII | re.IG
 _BARE: tuple[tuple, tuple] = ((), ())  # neither header nor units
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _UNIT = re.compile(
-    r"[(\[].*[)\]]|%|-|[kMG]?Pa|k?N|[cm]?m|s|sec|min|psi|ksi|°C|(N|kgf|mm|m)/([cm]?m|in)\^?[²2]?"
+    r"[(\[].*[)\]]|%|-|[kMG]?Pa|k?N|[cm]?m|s|sec|min|psi|ksi|m?bar|°C|(N|kgf|mm|m)/([cm]?m|in)\^?[²2]?"
 )
 
 

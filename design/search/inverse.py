@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, PAIRS, Aim
+from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.lookup import Guess, first_guesses
 from pneunet.design.search.problem import Body, Evaluation, Problem
 from pneunet.design.search.space import Variable, grid, limits, prototype, variables_of
@@ -119,11 +118,19 @@ def _guesses(target, pieces, prototypes, law):
         varying = limits(target, piece, segment)
         angles.append(grid(varying.get("angle"), 90.0, 5.0))
         heights.append(grid(varying.get("chamber_height"), segment.chamber_height, 1.0))
+    if len(target.pressures) > 1:
+        raise InputError("pressure_kPa: a design has one pressure for all segments: give one")
     low, high = target.pressure_range or (0.010, PRESSURE_LIMIT)
+    if target.weights is not None and not target.weights.any():  # the curve is a guide to the last tip point
+        low = high = max([float(s.pressures[0]) for s in target.shapes] + _tip_pressures(target))
     pressures = (
         np.linspace(low, high, max(1, round((high - low) / 0.010)) + 1) if high > low else np.array([low])
     )
     return first_guesses(pieces, prototypes, angles, heights, pressures, law)
+
+
+def _tip_pressures(target):
+    return [] if target.tip is None else target.tip.pressures.tolist()
 
 
 def shortest(segment: Segment) -> float:
@@ -147,7 +154,7 @@ class _Search:
     def run(self, guesses):
         problem, optimum = self._from_guesses(guesses)
         if self.objective == EQ27:
-            aims = (Aim.of(self.target, problem.body.segments[0].width, EQ27),)
+            aims = Aim.all_of(self.target, problem.body.segments[0].width, EQ27)
             problem, optimum = self._counted(optimised(replace(problem, aims=aims), self.floor))
         log.info(f"real-valued optimum: {_told(problem, optimum)}")
         flush = self._flush_costs(problem, optimum)
@@ -286,12 +293,13 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     """The Problem at an entry of the lookup table, with the base turned to the target."""
     segments, n = guess.segments, len(pieces)
     variables = variables_of(target, pieces, segments, not target.casting.allow_steps)
-    everyone = tuple(range(n))
-    if target.pressure_range is None:
-        variables.append(Variable("pressure", everyone, LEAST_PRESSURE, PRESSURE_LIMIT, 0.02))
-    elif target.pressure_range[1] > target.pressure_range[0]:
-        low, high = target.pressure_range
-        variables.append(Variable("pressure", everyone, low, high, high - low))
+    aims = Aim.all_of(target, segments[0].width)
+    pressures = np.array([guess.pressure if aim.pressure is None else aim.pressure for aim in aims])
+    if aims[0].pressure is None:
+        low, high = target.pressure_range or (LEAST_PRESSURE, PRESSURE_LIMIT)
+        if high > low:
+            scale = high - low if target.pressure_range else 0.02
+            variables.append(Variable("pressure", tuple(range(n)), low, high, scale))
     for i, count in enumerate(guess.counts):
         if segments[i].kind == PASSIVE:
             continue
@@ -301,26 +309,25 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     body = Body(
         segments,
         np.array(guess.counts),
-        np.full((1, n), guess.pressure),
+        np.tile(pressures[:, None], (1, n)),
         _some_rotation(target),
         target.points[0],
     )
     # flush undersides, and values within their ranges
     values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
     body = body.changed(variables, values)
-    aims = (Aim.of(target, segments[0].width),)
-    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns), target)
+    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns))
 
 
-def _turned_to_target(problem, target):
+def _turned_to_target(problem):
     """The base turned about its free axes to bring the present curve nearest to the target, in closed
     form."""
     free, body = problem.turns.shape[1], problem.body
     at = problem.evaluate(problem.x)
     if at is None or not free:
         return problem
-    points = (Curve(at.shapes[0].placed.points).evenly(PAIRS) - body.origin) @ body.rotation
-    wanted = (target.curve.evenly(PAIRS) - target.points[0]) @ body.rotation
+    aim, placed = problem.aims[0], at.shapes[0].placed
+    points, wanted = ((a - body.origin) @ body.rotation for a in (placed.points, aim.points))
     moment = points.T @ wanted
     if free == 1:
         turn = se3.exp_rotation(

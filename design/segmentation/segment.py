@@ -67,14 +67,14 @@ def fitted(
     data = Observations(
         points,
         floor,
-        length,
+        s,
         frames=frames,
         base=target.base_rotation,
         weights=weights,
         shortest=shortest,
     )
     stretches = Stretches(points, s, floor, shortest, frames)
-    data = replace(data, noise=stretches.noise)
+    data = replace(data, noise=stretches.noise, noise_seen=stretches.noise_seen)
     if target.pieces:
         fit = refined(_given(target, data, s), POLISH, 1e-4)
     else:

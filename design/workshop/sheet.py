@@ -17,7 +17,7 @@ GRAM_PER_TONNE = 1e6
 
 
 @dataclass(frozen=True)
-class Table:
+class SheetTable:
     """header (n,), rows of n texts."""
 
     header: Sequence[str]
@@ -39,7 +39,7 @@ class Picture:
     caption: str
 
 
-Block = str | Table | Steps | Picture
+Block = str | SheetTable | Steps | Picture
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def _print(pack):
     told.append(f"The thinnest fin is {plain(thin)} mm: print it with at least two lines, or in resin.")
     return [
         " ".join(told),
-        Table(["part", "count", "size, mm", "what for"], rows),
+        SheetTable(["part", "count", "size, mm", "what for"], rows),
         Picture("moulds.png", "The moulds as they lie on the bed."),
     ]
 
@@ -109,14 +109,14 @@ def called(layer: Layer, number: int, count: int) -> str:
 def _mix(pack):
     found = amounts(pack)
     rows = [[layer, name, plain(ml, 1), plain(gram, 1), str(casts)] for layer, name, ml, gram, casts in found]
-    totals = {}
+    totals: dict[str, float] = {}
     for _, name, _, gram, casts in found:
         totals[name] = totals.get(name, 0.0) + gram * casts
     told = "; ".join(f"{name} {plain(gram, 1)} g" for name, gram in totals.items())
     return [
         f"In all {told}, of which {plain(100 * pack.moulds.waste)} % stays in cup and vents. Of a silicone in"
         " two parts these are both together, in the maker's ratio.",
-        Table(["layer", "silicone", "mL a cast", "g a cast", "casts"], rows),
+        SheetTable(["layer", "silicone", "mL a cast", "g a cast", "casts"], rows),
     ]
 
 
@@ -190,7 +190,7 @@ def _inflate(pack):
         f"Design pressure {kPa(pack.design.pressure)}; do not exceed"
         f" {plain(lowest.pressure * KPA_PER_MPA, 1)} kPa: {lowest.reason}. The design is {verdict}."
         f" {_unknown(pack)}",
-        Table(
+        SheetTable(
             ["limit, kPa", "reason"],
             [[plain(limit.pressure * KPA_PER_MPA, 1), limit.reason] for limit in pack.limits],
         ),
@@ -214,5 +214,5 @@ def _keep(pack):
     return [
         "What moves the inflated shape most when it is off, by the reduced model. Measure these on the moulds"
         " before you cast.",
-        Table(["segment", "dimension", "off by", "shape moves, mm RMS", "tip moves, mm"], rows),
+        SheetTable(["segment", "dimension", "off by", "shape moves, mm RMS", "tip moves, mm"], rows),
     ]

@@ -28,7 +28,7 @@ TIGHT = 0.9
 
 
 @dataclass(frozen=True)
-class Piece:
+class MouldPiece:
     """A run's mould between two x (mm); free ends, a flange beyond the run, are not cut."""
 
     run: Run
@@ -170,7 +170,7 @@ def void(run: Run, plane: float, top: float, below: float, moulds: Moulds) -> li
     return tags
 
 
-def tray(piece: Piece, plane: float, top: float) -> int:
+def tray(piece: MouldPiece, plane: float, top: float) -> int:
     """Around what lies above `plane`; open there."""
     m = piece.moulds
     tag = piece.block(plane, top + m.floor)
@@ -197,7 +197,7 @@ def _joints(piece, z0, z1):
     ]
 
 
-def plate_with_cores(piece: Piece, plane: float) -> int:
+def plate_with_cores(piece: MouldPiece, plane: float) -> int:
     """Below `plane`, with the cores."""
     m = piece.moulds
     tag = _with(piece.block(plane - m.plate, plane), piece, plane, np.inf, m.plate / 2)
@@ -231,7 +231,7 @@ def vents(run: Run, diameter: float) -> list[tuple[float, float, float]]:
     return out
 
 
-def frame(piece: Piece, low: float, high: float) -> int:
+def frame(piece: MouldPiece, low: float, high: float) -> int:
     """Around a middle layer; open at `high`."""
     m = piece.moulds
     boxes = [cad.box(p.start, p.stop, p.segment.width / 2, low, high + 1) for p in piece.run.parts]
@@ -260,7 +260,7 @@ def core_tops(run: Run, plane: float) -> list[float]:
     return [z for z in tops if z > plane + 1e-9]
 
 
-def trough(rooms: np.ndarray, piece: Piece, top: float, ports: list[tuple[float, int]]) -> int:
+def trough(rooms: np.ndarray, piece: MouldPiece, top: float, ports: list[tuple[float, int]]) -> int:
     """A jig: rooms (n, 5) of x0, x1, y0, y1, lowest z, open at `top`; guides for the ports' tubes."""
     m, low = piece.moulds, rooms[:, 4].min() - piece.moulds.floor
     tag = piece.block(low, top)

@@ -17,7 +17,7 @@ from pneunet.base.errors import InputError
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad import mould_solids as solids
 from pneunet.geometry.cad.meshing import TRIANGLE, write_model
-from pneunet.geometry.cad.mould_solids import Piece
+from pneunet.geometry.cad.mould_solids import MouldPiece
 from pneunet.geometry.moulds.layers import LOWER, MIDDLE, UPPER, Run, runs
 from pneunet.geometry.moulds.parameters import Moulds, printed
 from pneunet.geometry.moulds.part import Part
@@ -131,7 +131,7 @@ def mould_parts(manipulator: Manipulator, moulds: Moulds, folder: Path | None = 
 
 def _pieces(run, moulds):
     cuts = run.cuts(moulds)
-    return [Piece(run, a, b, moulds) for a, b in zip(cuts, cuts[1:])]
+    return [MouldPiece(run, a, b, moulds) for a, b in zip(cuts, cuts[1:])]
 
 
 def _dowels(run, moulds):
@@ -228,7 +228,7 @@ def _assembly(large, found, moulds):
     top = max(core_section(s)[1, 1] for s in large.segments)
     joined = Run(tuple(p for run in found for p in run.parts), (0.0,), 0, 0)
     half = float(np.abs(rooms[:, 2:4]).max()) - c
-    pieces = [Piece(joined, p.start, p.stop, moulds, half) for p in _pieces(joined, moulds)]
+    pieces = [MouldPiece(joined, p.start, p.stop, moulds, half) for p in _pieces(joined, moulds)]
     for i, piece in enumerate(pieces, start=1):
         name = "assembly-jig" + f"-{i}" * (len(pieces) > 1)
         does = "holds the cast runs while they are joined end to end"

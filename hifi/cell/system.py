@@ -257,7 +257,7 @@ class CellSystem:
         self.factorise()
         stiffness, unstable = self.condensed.copy(), self.unstable
         for number in range(1, len(self.problem.classes)):
-            part, more = self._other_class(number)
+            _, part, more = self.of_class(number)
             stiffness += part
             unstable += more
         _, slope = self._parts()
@@ -277,18 +277,20 @@ class CellSystem:
             self.problem.array.copy(),
         )
 
-    def _other_class(self, number):
-        """(what another class adds to `condensed`, its unstable directions) at the factorised state."""
+    def of_class(self, number: int) -> tuple[np.ndarray, np.ndarray, int]:
+        """(influence, condensed, unstable directions) of another class of symmetry at the factorised
+        state."""
         each = self.problem.classes[number]
         matrix, mixed, curvature = self.problem.tangent_of(number)
         mixed = np.vstack([mixed, each.gauge_strains * each.strains])
         assembled, solver = _solver(matrix)
         try:
             solver.factorise()
-            condensed = curvature - mixed.T @ solver.solve_many(mixed)
+            influence = solver.solve_many(mixed)
+            condensed = curvature - mixed.T @ influence
             own = condensed[np.ix_(each.strains, each.strains)]
             unstable = solver.negative_pivots - each.constraints - each.gauge.shape[1]
-            return condensed, unstable + int(np.count_nonzero(np.linalg.eigvalsh(own) < 0))
+            return influence, condensed, unstable + int(np.count_nonzero(np.linalg.eigvalsh(own) < 0))
         finally:
             solver.destroy()
             assembled.destroy()

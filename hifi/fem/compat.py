@@ -56,11 +56,21 @@ def _compiler(comm: MPI.Comm) -> Iterator[None]:
             logging.disable(before)
 
 
+def _name_spacing(domain):
+    """Say of a mesh that its nodes are equally spaced, as gmsh's are said to be. ffcx does so when it has
+    compiled a form, and from then on all forms of the mesh have other names and would be compiled again."""
+    element = domain.ufl_coordinate_element()
+    if element.sub_elements()[0].variant() is None:
+        node = ufl.FiniteElement(element.family(), element.cell(), element.degree(), variant="equispaced")
+        domain._ufl_coordinate_element = ufl.VectorElement(node)
+
+
 def mixed_space(mesh: Mesh, degree: int = 2) -> fem.FunctionSpace:
     """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure; on hexahedra
     Q."""
     with _compiler(mesh.comm):
         if OLD:
+            _name_spacing(mesh.ufl_domain())
             u = ufl.VectorElement("CG", mesh.ufl_cell(), degree)
             p = ufl.FiniteElement("CG", mesh.ufl_cell(), degree - 1)
             return fem.FunctionSpace(mesh, ufl.MixedElement([u, p]))

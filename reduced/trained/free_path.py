@@ -26,8 +26,8 @@ from pneunet.reduced.trained.coordinates import (
     odd,
 )
 from pneunet.reduced.trained.gaussian import JITTER, ROWS
-from pneunet.reduced.trained.state_on_path import PathChain, StateOnPath
 from pneunet.reduced.trained.side_by_side import SideBySide
+from pneunet.reduced.trained.state_on_path import PathChain, StateOnPath
 from pneunet.reduced.trained.unexplained import Unexplained
 
 #: steps over the slope that end the search, of log(leading strain): what is left after them is of third order

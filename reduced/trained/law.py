@@ -114,6 +114,12 @@ class KindLaw:
         of log P beyond the end of their path; 0 inside."""
         pressure = np.maximum(pressure, LOWEST)
         _, beyond, there = self.path.at(shape, pressure, self.level)
+        return self.excess_there(shape, pressure, there, beyond)
+
+    def excess_there(
+        self, shape: np.ndarray, pressure: np.ndarray, there: np.ndarray, beyond: np.ndarray
+    ) -> np.ndarray:
+        """The same of free states whose path_inputs (n, d) and log P beyond the path's end (n,) are known."""
         return self._excess(self.ranged(shape, pressure), self.path.deviation(there, self.known), beyond)
 
     @property

@@ -11,10 +11,10 @@ from pneunet.base.materials.laws import NeoHookean, Yeoh
 from pneunet.base.strains import MIRROR
 from pneunet.geometry.parameters import KINDS, ONE_SIDED, TWISTING
 from pneunet.geometry.shape_numbers import shape_numbers
+from pneunet.reduced.rod.states import VARIABLES
 from pneunet.reduced.trained.coordinates import REST
 from pneunet.reduced.trained.file import read_law
 from pneunet.reduced.trained.law import TrainedLaw
-from pneunet.reduced.trained.states_with_slopes import VARIABLES
 from pneunet.reduced.training.judging import further_angles
 from pneunet.reduced.training.suggestion import most_telling
 from pneunet.reduced.training.train import (

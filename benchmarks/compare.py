@@ -1,0 +1,21 @@
+"""Public measurements beside what is computed (examples/measured): the part `compare`."""
+
+
+def compare():
+    """The clamped beam: largest difference from the middle of the measured drops, of body and rod."""
+    from examples.measured import arm, beam
+
+    body = {force: beam.body_drop(force) for force in beam.MEASURED}
+    coarser = beam.body_drop(0.0, (12, 4, 4))
+    rod = {force: beam.rod_drop(force) for force in beam.MEASURED}
+    figures = {
+        "compare_beam_tip_rel": max(abs(beam.off(drop, force)) for force, drop in body.items()),
+        "compare_beam_tip_rod_rel": max(abs(beam.off(drop, force)) for force, drop in rod.items()),
+    }
+    details = {
+        "body_mm": list(body.values()),
+        "rod_mm": list(rod.values()),
+        "body_coarser_own_weight_mm": coarser,
+    }
+    details |= {"measured_mm": list(beam.MEASURED.values()), "arm_arc_lengths_mm": arm.arc_lengths().tolist()}
+    return figures, details

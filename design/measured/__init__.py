@@ -1,0 +1,1 @@
+"""What a camera has measured, held against what was predicted."""
