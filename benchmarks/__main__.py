@@ -18,6 +18,7 @@ from benchmarks import (
     compare,
     contact,
     contact_page,
+    design,
     door,
     doubt,
     grids,
@@ -105,6 +106,10 @@ PARTS = {
         "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
     ),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
+    "design": (
+        design.design,
+        "designs of random targets and of the paper's raw curves, seconds, derivatives; some 15 minutes",
+    ),
     "remeshed": (
         remeshed.remeshed,
         "held-out cells on another mesh of the same size, against the law's errors; some 15 minutes",

@@ -62,7 +62,7 @@ class Aim:
 
     @classmethod
     def all_of(cls, target: Target, width: float, objective: str = PAIRED) -> "tuple[Aim, ...]":
-        """Its own curve, unless that is only a guide, then its further shapes, then where the tip is to be."""
+        """Its own curve, unless that is but a guide, then its further shapes, then where the tip is to be."""
         own = target.weights is None or bool(target.weights.any())
         aims = [cls.of(target, width, objective)] if own else []
         aims += [cls.of(shape, width, pressure=float(shape.pressures[0])) for shape in target.shapes]

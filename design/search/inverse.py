@@ -148,7 +148,8 @@ class _Search:
     def __init__(self, target, pieces, law, objective, most):
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
         self.optima = []
-        self.most = most if objective == PAIRED else 0
+        self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
+        self.most = most if objective == PAIRED and not self.loaded else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
 
     def run(self, guesses):
@@ -205,7 +206,7 @@ class _Search:
     def _flush_costs(self, problem, optimum):
         """By how much (mm) the root mean square would fall if undersides need not be flush."""
         joined = [v for v in problem.variables if v.name == "base_thickness" and len(v.segments) > 1]
-        if not joined:
+        if not joined or self.loaded:
             return 0.0
         apart = tuple(replace(v, segments=(i,)) for v in joined for i in v.segments)
         kept = tuple(v for v in problem.variables if v not in joined)
@@ -316,7 +317,8 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     # flush undersides, and values within their ranges
     values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
     body = body.changed(variables, values)
-    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns))
+    gravity = np.array(target.gravity)
+    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns, gravity))
 
 
 def _turned_to_target(problem):

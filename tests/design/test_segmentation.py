@@ -90,10 +90,8 @@ def test_gradient_agrees_with_differences(frames):
     random = np.random.default_rng(1)
     points, seen = observed(ROD, 150.0, noise=0.5, frames=frames)
     base = ROD.start[:3, :3] @ se3.exp_rotation(np.array([0.02, 0.01, -0.03]))
-    weights = random.uniform(0.5, 1.5, len(points))
-    data = Observations(
-        points, 0.3, np.linspace(0, 150, 150), frames=seen, base=base, weights=weights, shortest=37.0
-    )
+    more = {"frames": seen, "base": base, "weights": random.uniform(0.5, 1.5, 150), "shortest": 37.0}
+    data = Observations(points, 0.3, np.linspace(0, 150, 150), **more)
     rod = PiecewiseRod(ROD.start, ROD.joints + 1.0, ROD.strains * 1.02)
     fit = RodFit(data, rod, np.ones((4, 2), bool), np.linspace(0, 150, len(points)))
 
