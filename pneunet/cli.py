@@ -51,7 +51,8 @@ def mesh(a: Namespace) -> None:
 def export(a: Namespace) -> None:
     from pneunet.front import read_design
 
-    read_design(a.design).export(a.output or a.design.parent, a.moulds)
+    folder = a.design if a.design.is_dir() else a.design.parent
+    read_design(a.design).export(a.output or folder, a.moulds)
 
 
 def solve(a: Namespace) -> None:
