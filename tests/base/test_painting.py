@@ -40,10 +40,10 @@ def test_a_surface_s_file_is_read_by_vtk(tmp_path):
 
 
 def test_of_crossing_surfaces_the_nearest_is_seen_at_every_pixel():
-    """A face twice as large that lies halfway up a cube is seen around it and not inside; no sorting of whole
+    """A face twice as large that lies low around a cube is seen around it and not inside; no sorting of whole
     faces could tell."""
     top = FACES[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
-    sheet = (CORNERS - 0.5) * [2, 2, 0.5] + 0.5
+    sheet = (CORNERS - 0.5) * [2, 2, 0.2] + [0.5, 0.5, 0.2]
     points, triangles = np.vstack([CORNERS, sheet]), np.vstack([top, top + 8])
     picture = shaded(ABOVE, points, triangles, (200, 200, 200), (120, 80))
     assert picture.shape == (80, 120, 3)
