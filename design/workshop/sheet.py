@@ -147,7 +147,8 @@ def _cast(pack):
         Steps(
             [
                 *steps,
-                "Let it cure as the maker says. Cut the risers, lift the plate straight off: the cores have"
+                "Let it cure as the maker says. Cut the risers, slip a blade under a corner and"
+                " lift the plate straight off: the cores have"
                 " no undercut. Peel the layer out of its tray from one end.",
             ]
         )
