@@ -92,8 +92,8 @@ def _first(
 
         if s.chambers and of(top) < 0:
             found.append((float(brentq(of, 0.0, top, xtol=1e-6)), i + 1))
-    pressure, i = min(found, key=lambda each: each[0])
-    return max(pressure, solved.pressure if solved else 0.0), i
+    pressure, number = min(found, key=lambda each: each[0])
+    return max(pressure, solved.pressure if solved else 0.0), number
 
 
 def _limit_point(design, law, solved):
