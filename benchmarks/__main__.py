@@ -18,12 +18,14 @@ from benchmarks import (
     compare,
     contact,
     contact_page,
+    design,
     door,
     doubt,
     grids,
     house,
     kills,
     law,
+    moulds,
     paper,
     paper_page,
     people,
@@ -87,6 +89,10 @@ PARTS = {
         "the law's doubt: cost, agreement with the exact deviation; `pneunet shape` of the demo; a minute",
     ),
     "workspace": (workspace.hundred_thousand, "100,000 shapes of one to three segments; some seconds"),
+    "moulds": (
+        moulds.moulds,
+        "moulds of 20 random bodies by a second kernel: closed, no undercut, the body they leave; a minute",
+    ),
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
@@ -101,6 +107,10 @@ PARTS = {
         "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
     ),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
+    "design": (
+        design.design,
+        "designs of random targets and of the paper's raw curves, seconds, derivatives; some 15 minutes",
+    ),
     "remeshed": (
         remeshed.remeshed,
         "held-out cells on another mesh of the same size, against the law's errors; some 15 minutes",

@@ -27,6 +27,7 @@ from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.overlap import overlap_doubts
 from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
+from pneunet.reduced.rod.rod import Rod
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,6 +44,8 @@ points = "target.csv"
 """
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
+#: of the length, by which elements of a loaded rod may be off
+LOADED = 1e-4
 log = logging.getLogger(__name__)
 
 
@@ -182,7 +185,11 @@ class Design:
         ]
 
     def _predicted(self, pressure):
-        return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)
+        content = self.content
+        if not content.loads:
+            return predict(self.manipulator, pressure, self.law, base_pose=content.base_pose)
+        rod = Rod.of(self.manipulator, self.law, pressure, content.base_pose)
+        return rod.equilibrium(content.loads, tolerance=LOADED).line
 
     def save(self, directory: str | Path) -> Path:
         """`write` to a folder, which is made if need be; the folder. InputError where a run is at work in

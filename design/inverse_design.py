@@ -65,7 +65,9 @@ def inverse_design(
         log.info(f"  {text}")
     found = search(target, asked.pieces, law, objective)
     best = found.best
-    content = DesignFile(best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose)
+    content = DesignFile(
+        best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose, loads=target.loads
+    )
     effort = {
         "inputs": {"target": target.source or target.name, "objective": objective},
         "evaluations": found.evaluations,

@@ -18,7 +18,7 @@ from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.lookup import Guess, first_guesses
 from pneunet.design.search.problem import Body, Evaluation, Problem
 from pneunet.design.search.space import Variable, grid, limits, prototype, variables_of
-from pneunet.design.search.whole import on_grid, optimised, with_whole_chambers
+from pneunet.design.search.whole import STEPS, TRIED, on_grid, optimised, with_whole_chambers
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import PRESSURE_LIMIT, Target
 from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
@@ -148,7 +148,8 @@ class _Search:
     def __init__(self, target, pieces, law, objective, most):
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
         self.optima = []
-        self.most = most if objective == PAIRED else 0
+        self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
+        self.most = most if objective == PAIRED and not self.loaded else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
 
     def run(self, guesses):
@@ -194,9 +195,9 @@ class _Search:
             raise ConvergenceError(f"the law has no equilibrium at {least:.1f} kPa: lower the pressure")
         return best
 
-    def _try(self, problem):
+    def _try(self, problem, steps=30):
         """Its local optimum to the others'."""
-        found = optimised(problem, self.floor)
+        found = optimised(problem, self.floor, steps)
         if found is not None:
             self.evaluations += found[1].evaluations
             self.optima.append(found)
@@ -205,7 +206,7 @@ class _Search:
     def _flush_costs(self, problem, optimum):
         """By how much (mm) the root mean square would fall if undersides need not be flush."""
         joined = [v for v in problem.variables if v.name == "base_thickness" and len(v.segments) > 1]
-        if not joined:
+        if not joined or self.loaded:
             return 0.0
         apart = tuple(replace(v, segments=(i,)) for v in joined for i in v.segments)
         kept = tuple(v for v in problem.variables if v not in joined)
@@ -222,9 +223,9 @@ class _Search:
         steps = dict.fromkeys(names, casting.grid or 0.001)
         return {"angle": casting.angle_grid or 0.01} | steps
 
-    def _whole(self, problem, optimum):
+    def _whole(self, problem, optimum, tried=TRIED):
         """With whole numbers of chambers."""
-        found = with_whole_chambers(problem, optimum, self.floor)
+        found = with_whole_chambers(problem, optimum, self.floor, tried)
         self.evaluations += sum(o.evaluations for _, o in found)
         if not found:
             raise ConvergenceError("no whole numbers of chambers near the optimum can be built")
@@ -264,12 +265,12 @@ class _Search:
         for problem, optimum in sorted(self.optima, key=lambda found: found[1].cost):
             if min(abs(problem.body.pressures[0, 0] - P) for P in seen) >= APART:
                 seen.append(problem.body.pressures[0, 0])
-                yield self._whole(problem, optimum)
+                yield self._whole(problem, optimum, tried=1)
         apart = [g for g in guesses[:ALTERNATIVES] if min(abs(g.pressure - P) for P in seen) >= APART]
         for guess in apart:
             first = start(self.target, self.pieces, self.law, guess)
-            if found := self._try(_held_near(first, guess.pressure)):
-                yield self._whole(*found)
+            if found := self._try(_held_near(first, guess.pressure), STEPS):
+                yield self._whole(*found, tried=1)
         body = whole[0].body
         longest = int(np.argmax(body.counts))
         for change in (1, -1):
@@ -316,7 +317,8 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     # flush undersides, and values within their ranges
     values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
     body = body.changed(variables, values)
-    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns))
+    gravity = np.array(target.gravity)
+    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns, gravity))
 
 
 def _turned_to_target(problem):

@@ -21,6 +21,8 @@ GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"
 REFINED_NOTE = "split given by the user, refined"
 #: of the length, by which a curve may leave its pieces unless the user says: bare ends of segments do so
 TOLERANCE = 1e-3
+#: the same under gravity, which bends a segment unevenly: what it does is for the search to find
+LOADED_TOLERANCE = 1e-2
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
 FAITHFUL = 2e-3
 
@@ -64,7 +66,9 @@ def _given_or_found(target, law):
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
     options = target.split
     if options.tolerance is None:
-        options = replace(options, tolerance=TOLERANCE * _chords(target))
+        options = replace(
+            options, tolerance=(LOADED_TOLERANCE if any(target.gravity) else TOLERANCE) * _chords(target)
+        )
     split = segment(target, options=options, reach=reachable(target, law))
     followed, notes = target, split.notes
     if abs(target.length - split.length) > FAITHFUL * split.length:
@@ -124,4 +128,6 @@ def _extracted(split: Segmentation, target: Target):
     for i, p in enumerate(split.pieces):
         seen = target.frames is not None or (i < last and (i > 0 or target.base_rotation is not None))
         twist, curvature = p.twist or 0.0, p.curvature or 0.0
-        yield Extracted(p.kind, p.length, twist, curvature, split.rms, seen, "", p.roll)
+        # gravity twists what would only bend
+        kind = HELICAL if p.kind == BENDING and any(target.gravity) else p.kind
+        yield Extracted(kind, p.length, twist, curvature, split.rms, seen, "", p.roll)

@@ -11,14 +11,17 @@ import ffcx
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.io import gmshio
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from pneunet.base.system.interrupts import kept
 from pneunet.geometry import meshfile
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.fem.form_cache import form_cache, locked_form_cache
+
+with kept():
+    from dolfinx.io import gmshio  # which loads gmsh
 
 OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
 #: sums may be reordered and pow need not set errno, so that loops over quadrature points vectorise: residuals

@@ -25,8 +25,8 @@ SHORTENINGS = 4
 #: what a new tangent, and an updated one, must make of the residual where walls touch for the tangent to be
 #: updated further
 TANGENT_GAIN, UPDATE_GAIN = 0.2, 0.5
-#: tangents factorised for one step, after which it should have come closer: beyond a limit point there is nothing
-#: to come to
+#: tangents factorised for one step, after which it should have come closer: beyond a limit point there is
+#: nothing to come to
 MOST_TANGENTS = 6
 
 

@@ -13,10 +13,12 @@ import numpy as np
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.strains import RodStrains
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import PASSIVE, Segment
 from pneunet.geometry.sections import rotation
 from pneunet.reduced.rod.elements import TWIST_ORDER, NodalLoads, RodElements
+from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.piece_slopes import FIELD_AT, FIELDS
 from pneunet.reduced.rod.rod import Rod, rod_pieces
@@ -25,6 +27,8 @@ from pneunet.reduced.rod.rod import Rod, rod_pieces
 TOLERANCE = 1e-4
 #: mm, degrees, of a number of chambers; MPa: of the differences
 STEP, PRESSURE_STEP = 1e-3, 2e-5
+#: of FIELDS, those that no section depends on
+OF_LENGTHS = ("plain_length", "chambers")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,7 @@ def loaded(
 class _Balance:
     def __init__(self, segments, counts, law, pressures, rod, line, gravity):
         self.segments, self.counts, self.law, self.pressures = segments, counts, law, pressures
-        self.gravity, self.poses, h = gravity, line.poses, np.diff(line.s)
+        self.rod, self.gravity, self.poses, h = rod, gravity, line.poses, np.diff(line.s)
         ends = np.cumsum(rod.lengths)
         self.owner = np.minimum(np.searchsorted(ends, line.s[:-1] + h / 2), len(ends) - 1)
         self.elements = RodElements(h, [rod.pieces[i] for i in self.owner], rod.base_pose)
@@ -133,7 +137,11 @@ class _Balance:
             P = P + step
         else:
             segment = replace(segment, **{name: getattr(segment, name) + step})
-        pieces = rod_pieces([segment], [self.law], [P], [count])
+        if name in OF_LENGTHS:  # sections stay as they are
+            lengths, _ = free_pieces([segment], RodStrains.of_vector(np.eye(6)[:1]), [count])
+            pieces = [replace(p, length=length) for p, length in zip(self.rod.pieces[3 * i :], lengths)]
+        else:
+            pieces = rod_pieces([segment], [self.law], [P], [count])
         wrenches, masses = np.empty((own.sum(), 6)), np.empty((own.sum(), 4))
         place = self.owner[own] - 3 * i
         for j, piece in enumerate(pieces):
