@@ -155,9 +155,9 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_law(a, "trained")
     add_output(a, "out/NAME of the file, out/workspace without one")
 
-    a = add("mesh", "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
+    a = add("mesh", "CAD (STEP) and tagged mesh, with volumes and checks")
     a("design", type=path)
-    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
     add_output(a, "the design's folder")
 
     a = add("export", "everything to cast it: STEP and STL of body and moulds, a sheet for the workshop")
@@ -171,7 +171,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("design", type=path)
     text = "default: the design's; 0: its [loads] alone"
     a("--pressure-kPa", type=one_pressure, dest="pressure", help=text)
-    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
     a("--no-fields", action="store_true", help="write no ParaView files")
     text = "go on from the last accepted step of a run that was ended, on any ranks"
     a("--resume", action="store_true", help=text)
