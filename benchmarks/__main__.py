@@ -25,6 +25,7 @@ from benchmarks import (
     house,
     kills,
     law,
+    moulds,
     paper,
     paper_page,
     people,
@@ -87,6 +88,10 @@ PARTS = {
         "the law's doubt: cost, agreement with the exact deviation; `pneunet shape` of the demo; a minute",
     ),
     "workspace": (workspace.hundred_thousand, "100,000 shapes of one to three segments; some seconds"),
+    "moulds": (
+        moulds.moulds,
+        "moulds of 20 random bodies by a second kernel: closed, no undercut, the body they leave; a minute",
+    ),
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",

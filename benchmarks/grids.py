@@ -77,7 +77,7 @@ def cells():
         path = Path(folder) / "cell.npz"
         for name in KINDS:
             segment = CASES[name](60.0, 1)
-            for mesh in (6.0, (6.0, None)):
+            for mesh in (3.0, (3.0, None)):
                 sweep(segment, path, mesh)  # compiles the forms
             runs = {mesh: sweep(segment, path, value) for mesh, value in meshes.items()}
             fine, coarser = runs["fine"][1], runs["coarser"][1]

@@ -53,7 +53,8 @@ CHAIN = "design/chain.py"
 NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
-BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL", "trimesh", "manifold3d"}
+BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
+BLOCKED |= {"trimesh", "manifold3d"}
 BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:

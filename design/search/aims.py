@@ -98,12 +98,12 @@ class Aim:
         return self._weighed(np.vstack(parts))
 
     def _weighed(self, rows):
-        """Rows of the points, then of the edges, so that squares add up to a mean."""
+        """Rows of the points, then of the edges, so that squares add up to the points' mean and the edges'."""
         count = len(self.points)
-        if self.weights is None:
-            return rows / np.sqrt(count)
-        factors = np.sqrt(self.weights / count)
-        each = [np.repeat(factors, 3)] + ([np.repeat(factors, 6)] if self.edges is not None else [])
+        weights = np.ones(count) if self.weights is None else self.weights
+        each = [np.repeat(np.sqrt(weights / count), 3)]
+        if self.edges is not None:
+            each.append(np.repeat(np.sqrt(weights / (2 * count)), 6))
         factors = np.concatenate(each)
         return rows * (factors if rows.ndim == 1 else factors[:, None])
 

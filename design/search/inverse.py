@@ -18,7 +18,7 @@ from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.lookup import Guess, first_guesses
 from pneunet.design.search.problem import Body, Evaluation, Problem
 from pneunet.design.search.space import Variable, grid, limits, prototype, variables_of
-from pneunet.design.search.whole import on_grid, optimised, with_whole_chambers
+from pneunet.design.search.whole import STEPS, TRIED, on_grid, optimised, with_whole_chambers
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import PRESSURE_LIMIT, Target
 from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
@@ -195,9 +195,9 @@ class _Search:
             raise ConvergenceError(f"the law has no equilibrium at {least:.1f} kPa: lower the pressure")
         return best
 
-    def _try(self, problem):
+    def _try(self, problem, steps=30):
         """Its local optimum to the others'."""
-        found = optimised(problem, self.floor)
+        found = optimised(problem, self.floor, steps)
         if found is not None:
             self.evaluations += found[1].evaluations
             self.optima.append(found)
@@ -223,9 +223,9 @@ class _Search:
         steps = dict.fromkeys(names, casting.grid or 0.001)
         return {"angle": casting.angle_grid or 0.01} | steps
 
-    def _whole(self, problem, optimum):
+    def _whole(self, problem, optimum, tried=TRIED):
         """With whole numbers of chambers."""
-        found = with_whole_chambers(problem, optimum, self.floor)
+        found = with_whole_chambers(problem, optimum, self.floor, tried)
         self.evaluations += sum(o.evaluations for _, o in found)
         if not found:
             raise ConvergenceError("no whole numbers of chambers near the optimum can be built")
@@ -265,12 +265,12 @@ class _Search:
         for problem, optimum in sorted(self.optima, key=lambda found: found[1].cost):
             if min(abs(problem.body.pressures[0, 0] - P) for P in seen) >= APART:
                 seen.append(problem.body.pressures[0, 0])
-                yield self._whole(problem, optimum)
+                yield self._whole(problem, optimum, tried=1)
         apart = [g for g in guesses[:ALTERNATIVES] if min(abs(g.pressure - P) for P in seen) >= APART]
         for guess in apart:
             first = start(self.target, self.pieces, self.law, guess)
-            if found := self._try(_held_near(first, guess.pressure)):
-                yield self._whole(*found)
+            if found := self._try(_held_near(first, guess.pressure), STEPS):
+                yield self._whole(*found, tried=1)
         body = whole[0].body
         longest = int(np.argmax(body.counts))
         for change in (1, -1):

@@ -15,7 +15,7 @@ from scipy.optimize import lsq_linear
 #: damping of scaled steps at the start, relative to the Jacobian's; the range it is kept in
 DAMPING, LEAST, MOST = 1e-3, 1e-7, 1e6
 #: the search ends when a step promises less than these shares of the cost
-ENOUGH = 1e-4
+ENOUGH = 1e-3
 
 
 class Linearised(Protocol):

@@ -1,4 +1,4 @@
-"""`pneunet export`: everything to cast a design: the body and its moulds as STEP and STL, a sheet, a picture."""
+"""`pneunet export`: everything to cast a design: body and moulds as STEP and STL, a sheet, a picture."""
 
 import json
 import logging
@@ -38,8 +38,9 @@ def write_pack(
     moulds: Moulds | None = None,
     solved: Solution | None = None,
 ) -> Path:
-    """Write the pack to the folder directory/workshop, which is returned: body.step and .stl, moulds/, sheet.html
-    and .pdf, pictures, pack.json. solved: a finite element solution, whose limits count before estimates.
+    """Write the pack to the folder directory/workshop, which is returned: body.step and .stl, moulds/,
+    sheet.html and .pdf, pictures, pack.json. solved: a finite element solution, whose limits count before
+    estimates.
 
     InputError where a parameter of the moulds does not go with the body, a mould is larger than the bed, or
     a surface is not closed or is undercut.
@@ -48,7 +49,7 @@ def write_pack(
 
     moulds = moulds or Moulds()
     manipulator = design.manipulator
-    found = runs(printed(manipulator, moulds), _split(moulds))
+    found = runs(printed(manipulator, moulds), moulds.split_as_printed)
     with output_folder(Path(directory) / "workshop") as folder:
         log.info(f"export: {manipulator.chambers} chambers, {manipulator.length:.0f} mm")
         parts, record = [], []
@@ -72,10 +73,6 @@ def write_pack(
         write_text(folder / "pack.json", json.dumps(facts, indent=1) + "\n")
     log.info(f"{len(parts)} moulds, closed; sheet: {folder / 'sheet.html'}, sheet.pdf")
     return folder
-
-
-def _split(moulds):
-    return None if moulds.split is None else moulds.split / (1 - moulds.shrinkage)
 
 
 @contextmanager

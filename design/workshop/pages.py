@@ -11,7 +11,7 @@ from pneunet.base.files.atomic import atomic_path, write_text
 from pneunet.base.files.record import revision
 from pneunet.design.report.drawing import drawing_figure
 from pneunet.design.report.report import STYLE
-from pneunet.design.workshop.sheet import Block, Picture, Steps, Table
+from pneunet.design.workshop.sheet import Block, Picture, SheetTable, Steps
 from pneunet.geometry.designfile import DesignFile
 
 Sections = Sequence[tuple[str, list[Block]]]
@@ -37,7 +37,7 @@ def write_html(path: Path, name: str, sections: Sections) -> None:
 
 
 def _html(block, folder):
-    if isinstance(block, Table):
+    if isinstance(block, SheetTable):
         head = "".join(f"<th>{escape(h)}</th>" for h in block.header)
         rows = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in block.rows)
         return f'<div class="table"><table><tr>{head}</tr>{rows}</table></div>'
@@ -100,7 +100,7 @@ class _Pages:
         self.left -= LINE / 3
 
     def block(self, block: Block, folder: Path) -> None:
-        if isinstance(block, Table):
+        if isinstance(block, SheetTable):
             self.table(block)
         elif isinstance(block, Steps):
             for number, text in enumerate(block.texts, start=1):
@@ -113,7 +113,7 @@ class _Pages:
                 self.line(line)
         self.left -= LINE / 2
 
-    def table(self, table: Table) -> None:
+    def table(self, table: SheetTable) -> None:
         widths = [max(map(len, column)) for column in zip(table.header, *table.rows)]
         widths[-1] = max(min(widths[-1], CELLS - sum(widths[:-1]) - 2 * len(widths)), 12)
         for number, row in enumerate((table.header, *table.rows)):

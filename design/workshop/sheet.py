@@ -1,4 +1,4 @@
-"""The sheet for the workshop: what to print, what to mix, what to do, how far to inflate, what to keep exact."""
+"""The sheet for the workshop: what to print, mix and do, how far to inflate, what to keep exact."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ GRAM_PER_TONNE = 1e6
 
 
 @dataclass(frozen=True)
-class Table:
+class SheetTable:
     """header (n,), rows of n texts."""
 
     header: Sequence[str]
@@ -39,7 +39,7 @@ class Picture:
     caption: str
 
 
-Block = str | Table | Steps | Picture
+Block = str | SheetTable | Steps | Picture
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def _print(pack):
     told.append(f"The thinnest fin is {plain(thin)} mm: print it with at least two lines, or in resin.")
     return [
         " ".join(told),
-        Table(["part", "count", "size, mm", "what for"], rows),
+        SheetTable(["part", "count", "size, mm", "what for"], rows),
         Picture("moulds.png", "The moulds as they lie on the bed."),
     ]
 
@@ -109,14 +109,14 @@ def called(layer: Layer, number: int, count: int) -> str:
 def _mix(pack):
     found = amounts(pack)
     rows = [[layer, name, plain(ml, 1), plain(gram, 1), str(casts)] for layer, name, ml, gram, casts in found]
-    totals = {}
+    totals: dict[str, float] = {}
     for _, name, _, gram, casts in found:
         totals[name] = totals.get(name, 0.0) + gram * casts
     told = "; ".join(f"{name} {plain(gram, 1)} g" for name, gram in totals.items())
     return [
         f"In all {told}, of which {plain(100 * pack.moulds.waste)} % stays in cup and vents. Of a silicone in"
         " two parts these are both together, in the maker's ratio.",
-        Table(["layer", "silicone", "mL a cast", "g a cast", "casts"], rows),
+        SheetTable(["layer", "silicone", "mL a cast", "g a cast", "casts"], rows),
     ]
 
 
@@ -125,8 +125,8 @@ def _cast(pack):
     steps = [
         "Try all parts dry: dowels go in by hand, plates lie flat on their trays."
         + " Join the pieces of cut moulds with dowels, and tape over the seams from outside." * cut,
-        "Spray release agent and let it dry. Resin prints first need a full cure and a coat: uncured resin keeps"
-        " platinum silicone from setting.",
+        "Spray release agent and let it dry. Resin prints first need a full cure and a coat: uncured resin"
+        " keeps platinum silicone from setting.",
         "Weigh, mix and degas the silicone of one layer.",
     ]
     if any(s.layer_thickness for s in pack.design.manipulator.segments):
@@ -134,10 +134,10 @@ def _cast(pack):
             "The stiff layer comes first: pour it into the lower tray up to its thickness and let it gel."
         )
     steps += [
-        "Fill a tray to its rim, slowly, from one end, so that the narrow chambers' walls fill from below. Pierce"
-        " bubbles between the fins.",
-        "Lay the plate on from one end, cores down, until the dowels hold it. Silicone must rise in every vent:"
-        " that is how you see that the layer is full. Clamp or weigh it down.",
+        "Fill a tray to its rim, slowly, from one end, so that the narrow chambers' walls fill from below."
+        " Pierce bubbles between the fins.",
+        "Lay the plate on from one end, cores down, until the dowels hold it. Silicone must rise in every"
+        " vent: that is how you see that the layer is full. Clamp or weigh it down.",
     ]
     if any(layer.name == MIDDLE for run in pack.runs for layer in run.layers):
         steps.append("Fill the middle frame and draw a straight edge over its rim and ridge.")
@@ -147,8 +147,8 @@ def _cast(pack):
         Steps(
             [
                 *steps,
-                "Let it cure as the maker says. Cut the risers, lift the plate straight off: the cores have no"
-                " undercut. Peel the layer out of its tray from one end.",
+                "Let it cure as the maker says. Cut the risers, lift the plate straight off: the cores have"
+                " no undercut. Peel the layer out of its tray from one end.",
             ]
         )
     ]
@@ -157,22 +157,23 @@ def _cast(pack):
 def _bond(pack):
     groups = len(pack.design.manipulator.groups)
     steps = [
-        "Wipe both faces with isopropanol. Spread 0.2 mm of fresh silicone on the lower face, and keep 1 mm away"
-        " from channel and cavities: what is spread there closes them.",
+        "Wipe both faces with isopropanol. Spread 0.2 mm of fresh silicone on the lower face, and keep 1 mm"
+        " away from channel and cavities: what is spread there closes them.",
         "Lay the lower layer into the jig, then the middle one if there is one, then the upper one. The jig"
         " holds them in line. Press lightly, no more than the layers' own height, and let it cure.",
-        "Push a sharpened tube through each guide in the jig's wall, along y, until it is in the channel; pull it"
-        f" out with the core it has cut. Glue in the air's tube, {plain(pack.moulds.port)} mm outside.",
+        "Push a sharpened tube through each guide in the jig's wall, along y, until it is in the channel;"
+        f" pull it out with the core it has cut. Glue in the air's tube, {plain(pack.moulds.port)} mm"
+        " outside.",
     ]
     if len(pack.runs) > 1:
         steps.append(
-            "Join the runs end to end in the assembly jig, from base to tip. A greased rod through the channels"
-            " keeps them open where they go on; pull it out through the port or a cut at the tip."
+            "Join the runs end to end in the assembly jig, from base to tip. A greased rod through the"
+            " channels keeps them open where they go on; pull it out through the port or a cut at the tip."
         )
     if groups > 1:
         steps.append(
-            f"There are {groups} pressure groups. The bulkheads between them are cast with the layers: test each"
-            " group alone, the others must not rise."
+            f"There are {groups} pressure groups. The bulkheads between them are cast with the layers: test"
+            " each group alone, the others must not rise."
         )
     steps.append("Test under water at a fifth of the pressure: no bubbles.")
     return [Steps(steps)]
@@ -186,9 +187,10 @@ def _inflate(pack):
     lowest = pack.limits[0]
     verdict = "below it" if pressure < lowest.pressure else "NOT below it: expect what the reason says"
     return [
-        f"Design pressure {kPa(pack.design.pressure)}; do not exceed {plain(lowest.pressure * KPA_PER_MPA, 1)}"
-        f" kPa: {lowest.reason}. The design is {verdict}. {_unknown(pack)}",
-        Table(
+        f"Design pressure {kPa(pack.design.pressure)}; do not exceed"
+        f" {plain(lowest.pressure * KPA_PER_MPA, 1)} kPa: {lowest.reason}. The design is {verdict}."
+        f" {_unknown(pack)}",
+        SheetTable(
             ["limit, kPa", "reason"],
             [[plain(limit.pressure * KPA_PER_MPA, 1), limit.reason] for limit in pack.limits],
         ),
@@ -212,5 +214,5 @@ def _keep(pack):
     return [
         "What moves the inflated shape most when it is off, by the reduced model. Measure these on the moulds"
         " before you cast.",
-        Table(["segment", "dimension", "off by", "shape moves, mm RMS", "tip moves, mm"], rows),
+        SheetTable(["segment", "dimension", "off by", "shape moves, mm RMS", "tip moves, mm"], rows),
     ]

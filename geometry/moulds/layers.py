@@ -26,7 +26,7 @@ UPPER, MIDDLE, LOWER = "upper", "middle", "lower"
 
 
 @dataclass(frozen=True)
-class Placed:
+class RunMember:
     """A segment in a run's frame: from x = start on; its channel between two x, empty where there is none;
     ports: [(x, side of y from which the tube comes)]. All mm."""
 
@@ -62,7 +62,7 @@ class Placed:
         """x of the chambers' centres, (chambers,)."""
         return self.start + self.segment.chamber_positions
 
-    def turned(self) -> "Placed":
+    def turned(self) -> "RunMember":
         """The same, turned by half a turn about x."""
         return replace(self, up=not self.up, ports=tuple((x, -side) for x, side in self.ports))
 
@@ -72,7 +72,7 @@ class Run:
     """Neighbouring segments that are cast together; planes: one or two z (mm) at which they are split;
     segments of the body from `first` (0 ..) on; turn (degrees about x) from the body's axes to the run's."""
 
-    parts: tuple[Placed, ...]
+    parts: tuple[RunMember, ...]
     planes: tuple[float, ...]
     first: int
     turn: int
@@ -187,7 +187,7 @@ def _run(manipulator, indices, split):
         channel = max(start, float(low)), min(start + s.length, float(high))
         mine = float(ports[s.group - 1])
         own = s.chambers and start <= mine < start + s.length
-        parts.append(Placed(s, start, up, channel, ((mine, -1 if up else 1),) if own else ()))
+        parts.append(RunMember(s, start, up, channel, ((mine, -1 if up else 1),) if own else ()))
     planes = sorted({p.segment.cavity_floor * side for p in parts for side in p.sides}) or [0.0]
     if planes[-1] - planes[0] < SAME:
         planes = planes[:1]
@@ -214,7 +214,7 @@ def _chosen(parts, planes, split):
     return split if up else -split
 
 
-def body_volume(placed: Placed, z0: float = -np.inf, z1: float = np.inf) -> float:
+def body_volume(placed: RunMember, z0: float = -np.inf, z1: float = np.inf) -> float:
     """mm3 of silicone of a segment between two heights of its run."""
     s, inside = placed.segment, (z0, z1)
     volume = s.length * s.width * _common(placed.core, inside)

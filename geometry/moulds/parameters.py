@@ -53,6 +53,11 @@ class Moulds(Checked):
         """Of drafted walls: mm sideways a mm of height."""
         return float(np.tan(np.radians(self.draft)))
 
+    @property
+    def split_as_printed(self) -> float | None:
+        """The split, in moulds as large as `printed`."""
+        return None if self.split is None else self.split / (1 - self.shrinkage)
+
 
 def printed(manipulator: Manipulator, moulds: Moulds) -> Manipulator:
     """The manipulator as large as its moulds must be, so that it is right when the silicone has shrunk.
@@ -89,5 +94,6 @@ def _check(where: str, s: Segment, moulds: Moulds) -> None:
         )
     if 2 * moulds.fillet > tip - 0.01:
         raise InputError(
-            f"fillet_mm = {moulds.fillet:g}: must be less than half of the cores of {where}, {tip:.3g} mm thick"
+            f"fillet_mm = {moulds.fillet:g}: must be less than half of the cores of {where}, {tip:.3g} mm"
+            " thick"
         )

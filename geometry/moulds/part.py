@@ -5,6 +5,7 @@ own -z. It can be if, where silicone is, its sections never grow upwards: no und
 print.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,8 @@ NOTHING = 1e-5
 class Part:
     """points (n, 3) in mm and triangles (m, 3), outward; count: how many to print; does: what it is for.
 
-    place (4, 4): from the frame it is printed in to the body's axes. silicone (2, 3): lowest and highest
+    places: (4, 4) each, from the frame it is printed in to the body's axes, one for every layer that it
+    forms. silicone (2, 3): lowest and highest
     corner of the box with all the silicone that it forms, as printed; None where it forms none.
     """
 
@@ -30,7 +32,7 @@ class Part:
     points: np.ndarray
     triangles: np.ndarray
     count: int = 1
-    place: np.ndarray | None = None
+    places: tuple[np.ndarray, ...] = (np.eye(4),)
     silicone: np.ndarray | None = None
 
     @property
@@ -99,3 +101,26 @@ def undercut(part: Part) -> float:
     levels = levels[np.append(True, np.diff(levels) > 1e-5)]
     sections = [solid.slice(float(z)) ^ window for z in (levels[1:] + levels[:-1]) / 2]
     return max(((upper - lower).area() for lower, upper in zip(sections, sections[1:])), default=0.0)
+
+
+def cast(parts: Iterable[Part]) -> Any:
+    """manifold3d's Manifold, in the body's axes and the moulds' size, of all that silicone fills: what the
+    moulds leave of the boxes that it lies in, layer by layer."""
+    import manifold3d
+
+    layers: dict[tuple, Any] = {}
+    for part in parts:
+        if part.silicone is None:
+            continue
+        low, high = part.silicone
+        for place in part.places:
+            layer = tuple(np.sort(moved(part.silicone, place), axis=0).round(6).ravel())
+            if layer not in layers:
+                layers[layer] = manifold3d.Manifold.cube(high - low).translate(low).transform(place[:3])
+            layers[layer] -= part.manifold().transform(place[:3])
+    return sum(layers.values(), manifold3d.Manifold())
+
+
+def moved(points: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Points (n, 3) by a rigid motion (4, 4)."""
+    return points @ place[:3, :3].T + place[:3, 3]
