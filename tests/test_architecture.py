@@ -53,7 +53,7 @@ CHAIN = "design/chain.py"
 NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
-BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
+BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL", "plotly"}
 BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:
