@@ -120,6 +120,12 @@ def report(a: Namespace) -> None:
     write(a.directory, a.law)
 
 
+def view(a: Namespace) -> None:
+    from pneunet.design.report.viewing import run_view
+
+    run_view(a.run, a.output, a.law, a.film and f".{a.film}", a.window)
+
+
 def compare(a: Namespace) -> None:
     from pneunet.design.measured.comparison import run_compare
 
@@ -157,6 +163,7 @@ COMMANDS = {
     "suggest": suggest,
     "train": train,
     "report": report,
+    "view": view,
     "compare": compare,
     "fit-material": fit_material,
     "run": run,
