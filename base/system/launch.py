@@ -47,7 +47,18 @@ SETTINGS = {
 RANKS_PER_CORE = 64
 HEARING_SECONDS = 0.3
 #: sub-commands whose ranks would all do the same
-SERIAL = ("design", "shape", "mesh", "cell", "suggest", "report", "fit-material", "doctor")
+SERIAL = (
+    "design",
+    "shape",
+    "mesh",
+    "cell",
+    "suggest",
+    "report",
+    "fit-material",
+    "doctor",
+    "compare",
+    "export",
+)
 
 
 def environment() -> dict[str, str]:
