@@ -10,6 +10,8 @@ KINDS = ("one_sided_w10", "twist_w12")
 PRESSURES = (0.02, 0.05)
 #: (largest element, layer beside planes with re-entrant edges), mm: a family of one shape at two sizes
 COARSER, FINER = (2.0, 0.5), (1.0, 0.25)
+#: MPa: a pressure under which a body's answer is linear
+SMALL = 1e-5
 #: of convergence at edges of 270 degrees: twice the exponent of their singularity
 ORDER = 2 * 0.5445
 
@@ -96,3 +98,35 @@ def cells():
         "cell_fine_cpu_seconds": float(max(r["cpu_seconds"] for r in rows if r["mesh"] == "fine")),
         "cell_default_cpu_seconds": float(max(r["cpu_seconds"] for r in rows if r["mesh"] == "default")),
     }, {"runs": rows}
+
+
+def bodies(sizes=(1.5, 0.75), tetrahedra=2.0):
+    """The part `body-grids`: ({key: value}, details): the tip of one-sided-w10, five chambers, at rest's
+    stiffness."""
+    from pneunet.geometry.cad.mesh import mesh_manipulator
+    from pneunet.geometry.meshfile import MESH
+    from pneunet.geometry.parameters import Manipulator
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.hifi.body.manipulator import ManipulatorSolve
+
+    body, tips, rows = Manipulator((CASES["one_sided_w10"](60.0, 5),)), [], []
+    meshes = [*((size, "hexahedra") for size in sizes), (tetrahedra, "tetrahedra")]
+    with tempfile.TemporaryDirectory() as folder:
+        for size, element in meshes:
+            mesh_manipulator(body, size, folder, element)
+            started = time.process_time()
+            solve = ManipulatorSolve(body, Path(folder) / MESH)
+            solve.run(SMALL, stability=False, first_step=SMALL)
+            tips.append((solve.measure().frames[-1, :3, 3] - [body.length, 0, 0]) / SMALL)
+            rows.append(
+                {
+                    "mesh_size_mm": size,
+                    "element": element,
+                    "dofs": solve.problem.dofs,
+                    "cpu_seconds": time.process_time() - started,
+                    "tip_mm_per_MPa": tips[-1].tolist(),
+                }
+            )
+            solve.destroy()
+    off = [float(np.linalg.norm(tip - tips[1]) / np.linalg.norm(tips[1])) for tip in tips]
+    return {"body_grid_tip_rel": off[0], "body_tetrahedra_tip_rel": off[2]}, {"runs": rows}

@@ -155,9 +155,9 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_law(a, "trained")
     add_output(a, "out/NAME of the file, out/workspace without one")
 
-    a = add("mesh", "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
+    a = add("mesh", "CAD (STEP) and tagged mesh, with volumes and checks")
     a("design", type=path)
-    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
     add_output(a, "the design's folder")
 
     a = add("export", "everything to cast it: STEP and STL of body and moulds, a sheet for the workshop")
@@ -171,7 +171,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("design", type=path)
     text = "default: the design's; 0: its [loads] alone"
     a("--pressure-kPa", type=one_pressure, dest="pressure", help=text)
-    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
     a("--no-fields", action="store_true", help="write no ParaView files")
     text = "go on from the last accepted step of a run that was ended, on any ranks"
     a("--resume", action="store_true", help=text)
@@ -220,6 +220,13 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a = add("report", "one HTML page: target, reduced prediction and finite elements side by side")
     a("directory", type=path)
     add_law(a, None)
+
+    a = add("view", "a page to turn the body in any browser, with a slider over load steps; a window, a film")
+    a("run", type=path, metavar="RUN", help="a design's folder")
+    a("--film", choices=("gif", "mp4"), help="of the inflation, as well")
+    a("--window", action="store_true", help="open a window as well, where there is a display")
+    add_law(a, None)
+    add_output(a, "the design's folder, where the report finds the page")
 
     a = add(
         "compare", "a measurement over pressure beside its prediction, and the modulus that it speaks for"

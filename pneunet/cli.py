@@ -51,7 +51,8 @@ def mesh(a: Namespace) -> None:
 def export(a: Namespace) -> None:
     from pneunet.front import read_design
 
-    read_design(a.design).export(a.output or a.design.parent, a.moulds)
+    folder = a.design if a.design.is_dir() else a.design.parent
+    read_design(a.design).export(a.output or folder, a.moulds)
 
 
 def solve(a: Namespace) -> None:
@@ -119,6 +120,12 @@ def report(a: Namespace) -> None:
     write(a.directory, a.law)
 
 
+def view(a: Namespace) -> None:
+    from pneunet.design.report.viewing import run_view
+
+    run_view(a.run, a.output, a.law, a.film and f".{a.film}", a.window)
+
+
 def compare(a: Namespace) -> None:
     from pneunet.design.measured.comparison import run_compare
 
@@ -156,6 +163,7 @@ COMMANDS = {
     "suggest": suggest,
     "train": train,
     "report": report,
+    "view": view,
     "compare": compare,
     "fit-material": fit_material,
     "run": run,

@@ -94,6 +94,7 @@ def _write(run, law, folder):
     body = _headline(run, comparison)
     for title, content in (
         ("Target, prediction, finite elements", lambda: _shapes(run, comparison, scene, folder)),
+        ("To turn by hand", lambda: _turned(run)),
         ("Errors", lambda: _errors(comparison, run)),
         ("Strains of the segments", lambda: _strains(run, comparison)),
         ("Load history", lambda: _history(run, law, folder)),
@@ -217,6 +218,17 @@ def _shapes(run, comparison, scene, folder):
         + _grid(folder, beside)
         + "".join(_image(folder, *c) for c in curves)
         + _grid(folder, fields)
+    )
+
+
+def _turned(run):
+    """The page of `pneunet view` in a frame, where the folder holds one."""
+    if not (run.directory / "view.html").exists():
+        return _missing(f"To turn the body in a browser: pneunet view {run.directory}")
+    return (
+        '<p><a href="view.html">On a page of its own</a>, which lies beside this one.</p><iframe'
+        ' src="view.html" title="the body, to turn" loading="lazy"'
+        ' style="width:100%;height:820px;border:1px solid #e4e8ec"></iframe>'
     )
 
 

@@ -218,8 +218,8 @@ class _Search:
 
     def _grid(self):
         casting = self.target.casting
-        names = ("wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall")
-        names += ("cavity_thickness", "gap", "end_margin", "plain_length")
+        names = ["wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall"]
+        names += ["cavity_thickness", "gap", "end_margin", "plain_length"]
         steps = dict.fromkeys(names, casting.grid or 0.001)
         return {"angle": casting.angle_grid or 0.01} | steps
 
@@ -246,7 +246,8 @@ class _Search:
 
     def _alternatives(self, best, whole, guesses):
         """Distinct Candidates that are not much worse."""
-        found, allowed = [], max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+        found: list[Candidate] = []
+        allowed = max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
         for other in self._others(whole, guesses) if self.most else ():
             if np.sqrt(other[1].at.misfit) > allowed:
                 continue
@@ -270,7 +271,7 @@ class _Search:
         for guess in apart:
             first = start(self.target, self.pieces, self.law, guess)
             if found := self._try(_held_near(first, guess.pressure), STEPS):
-                yield self._whole(*found, tried=1)
+                yield self._whole(found[0], found[1], tried=1)
         body = whole[0].body
         longest = int(np.argmax(body.counts))
         for change in (1, -1):

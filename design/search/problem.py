@@ -26,7 +26,7 @@ from pneunet.reduced.rod.piece_slopes import (
     piece_twists,
     strain_slopes,
 )
-from pneunet.reduced.rod.placing import Placed, PlacedRod
+from pneunet.reduced.rod.placing import PlacedRod, Stations
 from pneunet.reduced.rod.states import StatesWithSlopes
 
 #: mm of misfit per mm that facing walls would overlap: contact is not designed into
@@ -84,7 +84,7 @@ class Shape:
     axes of space, besides those of a rigid body; states: of the cells; strain_moves (s, 3, n, 6): derivatives
     of the points by the cells' free strains, where they were asked for."""
 
-    placed: Placed
+    placed: Stations
     turns: np.ndarray
     moves: np.ndarray
     base_turns: np.ndarray
