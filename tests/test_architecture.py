@@ -53,8 +53,8 @@ CHAIN = "design/chain.py"
 NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
-BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL", "plotly"}
-BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
+BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
+BLOCKED |= {"plotly", "fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:
     def find_spec(self, name, path=None, target=None):

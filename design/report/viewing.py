@@ -3,6 +3,7 @@
 import logging
 import os
 import sys
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ NUMBER = 4 * 4 / 3
 LINE, PLAIN = "#111111", segment_colour(0)
 FILM_PIXELS, FILM_SECONDS = (720, 576), 4.0
 FILMS = (".gif", ".mp4")
+PAGE = "view.html"
 
 
 def run_view(
@@ -57,7 +59,7 @@ def run_view(
     if not steps.solved:
         log.info("no finite element fields in this folder: the reduced model's body is shown")
     with output_folder(directory or run) as folder:
-        path = folder / "view.html"
+        path = folder / PAGE
         write_text(path, page(steps))
         log.info(f"{len(steps.labels)} steps, {path.stat().st_size / 1e6:.1f} MB: {path}")
         if film:
@@ -66,6 +68,17 @@ def run_view(
     if window:
         show_window(steps)
     return path
+
+
+def framed(directory: Path) -> str:
+    """HTML that shows the page in a frame of another one in the same folder, or says how to make it."""
+    if not (directory / PAGE).exists():
+        return f'<p class="missing">To turn the body in a browser: pneunet view {escape(str(directory))}</p>'
+    return (
+        f'<p><a href="{PAGE}">On a page of its own</a>, which lies beside this one.</p><iframe src="{PAGE}"'
+        ' title="the body, to turn" loading="lazy" style="width:100%;height:820px;border:1px solid #e4e8ec">'
+        "</iframe>"
+    )
 
 
 def has_display() -> bool:
@@ -186,7 +199,7 @@ def _controls(figure, steps, keys, last):
     low, high = everything.min(axis=0), everything.max(axis=0)
     margin = 0.03 * (high - low).max()
     low, high = low - margin, high + margin
-    size = (high - low) / (high - low).max()
+    size = 1.5 * (high - low) / np.linalg.norm(high - low)
     elevation, azimuth = np.radians(camera_angles(steps.points[-1]))
     eye = 1.5 * np.array(
         [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
@@ -200,12 +213,12 @@ def _controls(figure, steps, keys, last):
         scene=axes
         | {
             "aspectmode": "manual",
-            "aspectratio": dict(zip("xyz", map(float, 1.6 * size))),
+            "aspectratio": dict(zip("xyz", map(float, size))),
             "camera": {"eye": dict(zip("xyz", map(float, eye)))},
         },
         sliders=[slider],
         updatemenus=menus,
-        legend={"x": 0.0, "y": 0.9},
+        legend={"x": 0.0, "y": 0.0},
         margin={"l": 0, "r": 0, "t": 140, "b": 10},
         height=760,
     )
