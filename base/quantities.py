@@ -110,6 +110,8 @@ class Checked:
                 value = math.hypot(*value)
             if factor != 1.0 and isinstance(value, Real):
                 value = rounded(value / factor)
+            if field.type is int and isinstance(value, Real) and value % 1:
+                raise InputError(f"{key} = {value:g} must be a whole number")
             if value not in allowed:
                 told = f"{value:g}" if isinstance(value, float) else shown(value)
                 raise InputError(f"{key} = {told} {allowed.refusal(value, field.metadata['unit'])}")

@@ -18,11 +18,14 @@ from benchmarks import (
     compare,
     contact,
     contact_page,
+    design,
     door,
     doubt,
+    grids,
     house,
     kills,
     law,
+    moulds,
     paper,
     paper_page,
     people,
@@ -62,6 +65,9 @@ PARTS = {
         "lines of Python, time of the import, type errors, the wheel's test; 3 minutes",
     ),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
+    "grids": (grids.made, "grids of 10,000 random segments and 500 random manipulators; some 4 minutes"),
+    "cell-grids": (grids.cells, "cells of both kinds on grids of hexahedra: errors, cost; some 10 minutes"),
+    "body-grids": (grids.bodies, "the tip of a body at rest on grids and tetrahedra; some 3 minutes"),
     "segments": (
         segments.against_segments,
         "the cell against finite segments of 9 and 30 chambers: cost of a step, strains; 10 minutes",
@@ -83,6 +89,10 @@ PARTS = {
         "the law's doubt: cost, agreement with the exact deviation; `pneunet shape` of the demo; a minute",
     ),
     "workspace": (workspace.hundred_thousand, "100,000 shapes of one to three segments; some seconds"),
+    "moulds": (
+        moulds.moulds,
+        "moulds of 20 random bodies by a second kernel: closed, no undercut, the body they leave; a minute",
+    ),
     "silicones": (
         silicones.silicones,
         "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
@@ -98,6 +108,10 @@ PARTS = {
     ),
     "view": (compare.view, "size of the page of `pneunet view` of the demo, after make demo; some seconds"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
+    "design": (
+        design.design,
+        "designs of random targets and of the paper's raw curves, seconds, derivatives; some 15 minutes",
+    ),
     "remeshed": (
         remeshed.remeshed,
         "held-out cells on another mesh of the same size, against the law's errors; some 15 minutes",

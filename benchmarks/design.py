@@ -95,9 +95,8 @@ def raw(name):
     target = Target.read(name)
     if not any(p.kind == "twisting" for p in target.pieces):
         return replace(target, pieces=())
-    strains = RodStrains(
-        [[1.0, 0, 0]] * len(target.pieces), [[p.twist or 0.0, p.curvature or 0.0, 0.0] for p in target.pieces]
-    )
+    rates = [[p.twist or 0.0, p.curvature or 0.0, 0.0] for p in target.pieces]
+    strains = RodStrains([[1.0, 0, 0]] * len(rates), rates)
     line = centreline([p.length for p in target.pieces], strains, 1.0)
     frames = line.at(np.clip(target.curve.arc_lengths, 0, line.s[-1]))
     assert np.linalg.norm(frames[:, :3, 3] - target.points, axis=1).max() < 0.05  # they are its points
@@ -110,9 +109,9 @@ def papers_targets():
 
     errors = {name: inverse_design(raw(name)).errors for name in ("octopus", "tentacle2", "vase", "pear")}
     figures = {f"{name}_raw_rms_mm": errors[name].rms for name in ("octopus", "tentacle2")}
-    return figures | {
-        f"{n}_raw_rms_rel": errors[n].rms / errors[n].reference_length for n in ("vase", "pear")
-    }
+    for name in ("vase", "pear"):
+        figures[f"{name}_raw_rms_rel"] = errors[name].rms / errors[name].reference_length
+    return figures
 
 
 def seconds():

@@ -7,13 +7,13 @@ from pathlib import Path
 from pneunet.base.errors import InputError
 
 PEOPLE = Path(__file__).resolve().parents[1] / "tests" / "data" / "people"
-#: rows of a curve's file; that its split is right, too, is not looked at here
-POINTS = {
-    "byte_order_mark_bare": 4,
-    "semicolon": 5,
-    "five_markers_on_an_arc": 5,
-    "noisy_arc": 200,
-    "s_curve_in_a_plane": 61,
+#: rows of a curve's file, and (roll, length) of the bending pieces that it is made of, where that is known
+CURVES = {
+    "byte_order_mark_bare": (4, None),
+    "semicolon": (5, [(0, 150)]),
+    "five_markers_on_an_arc": (5, [(0, 150)]),
+    "noisy_arc": (200, [(0, 150)]),
+    "s_curve_in_a_plane": (61, [(0, 75), (180, 75)]),
 }
 #: what a test that is not of tension, or a length without its gauge length, is told
 REFUSALS = {"compression": "compress", "simple_shear": "shear", "elongation_in_mm": "--gauge-length-mm"}
@@ -41,10 +41,19 @@ def _refused(name, told):
     return False
 
 
-def _read(name, points):
+def _curve(name, points, wanted):
+    """Read, and split into what it is made of, to 1 mm of length and 1 % of curvature."""
+    from pneunet.design.segmentation.segment import segment
     from pneunet.design.target.file import read_target
 
-    return len(read_target(PEOPLE / f"{name}.csv").points) == points
+    target = read_target(PEOPLE / f"{name}.csv")
+    right = len(target.points) == points
+    if wanted is not None:
+        pieces = segment(target).pieces
+        right &= [(p.kind, p.roll) for p in pieces] == [("bending", roll) for roll, _ in wanted]
+        right &= all(abs(p.length - length) < 1 for p, (_, length) in zip(pieces, wanted))
+        right &= all(abs(p.curvature - 1 / 60) < 0.01 / 60 for p in pieces)
+    return right
 
 
 def _flat_circles():
@@ -76,7 +85,7 @@ def people():
     logging.disable(logging.WARNING)
     checks = {name: (_tensile, name) for name in TENSILE}
     checks |= {name: (_refused, name, told) for name, told in REFUSALS.items()}
-    checks |= {name: (_read, name, points) for name, points in POINTS.items()}
+    checks |= {name: (_curve, name, *known) for name, known in CURVES.items()}
     checks |= {"one_and_a_half_flat_circles": (_flat_circles,), "coil_through_itself": (_coil,)}
     checks |= {"stiff_paper_layer": (_paper_layer,)}
     right = {}

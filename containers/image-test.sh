@@ -23,6 +23,6 @@ in_image "$out" sh -c 'cd /opt/pneunet && pneunet run -n 2 -- python -m pneunet.
 .venv/bin/pneunet run -n 2 -- python -m pneunet.hifi.verification.reference_case "$out/native.json"
 .venv/bin/python containers/compare.py "$out/native.json" "$out/image.json" --rtol 1e-6
 
-say "tests of the command line in the image: input, launcher, doctor"
-in_image "$out" sh -c 'cd /opt/pneunet && python -m pytest -q -p no:cacheprovider tests/pneunet/test_bad_input.py tests/pneunet/test_launch.py tests/pneunet/test_doctor.py'
+say "tests of the command line in the image"
+in_image "$out" sh -c 'cd /opt/pneunet && python -m pytest -q -p no:cacheprovider -n 2 --dist loadfile tests/pneunet'
 say "passed"

@@ -33,6 +33,8 @@ def run_command(arguments: Sequence[str], ranks: int = 1) -> None:
     InputError or ConvergenceError with what the command said where it ends with exit code 2, RuntimeError
     where it ends otherwise. An interrupt is passed on, and the command ends as it does from a terminal.
     """
+    if not isinstance(ranks, int) or ranks < 1:
+        raise InputError(f"ranks = {ranks!r} must be a whole number, at least 1")
     program = [sys.executable, "-P", "-m", "pneunet", *arguments]
     if ranks > 1:
         program[4:4] = ["run", "-n", str(ranks)]

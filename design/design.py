@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 import scipy
 
-from pneunet.base.files.atomic import write_csv
+from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
+from pneunet.design.segmentation.segmentation import piece_tables
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
@@ -26,6 +27,7 @@ from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.overlap import overlap_doubts
 from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
+from pneunet.reduced.rod.rod import Rod
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,9 +35,17 @@ if TYPE_CHECKING:
     from pneunet.design.report.rundata import Solution
     from pneunet.design.search.inverse import Candidate
     from pneunet.design.search.tolerances import Tolerances
+    from pneunet.geometry.moulds.parameters import Moulds
 
+#: how split.toml begins
+SPLIT = """# The split that this design follows: edited, a target of its own, or tables for yours.
+points = "target.csv"
+
+"""
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
+#: of the length, by which elements of a loaded rod may be off
+LOADED = 1e-4
 log = logging.getLogger(__name__)
 
 
@@ -106,7 +116,7 @@ class Design:
     @property
     def followed(self) -> bool:
         """Whether the prediction follows all of the target; true without one."""
-        return self.errors is None or not self.errors.not_followed
+        return not any(e.not_followed for e in (self.errors, *self.further_errors) if e)
 
     @property
     def manipulator(self) -> Manipulator:
@@ -133,6 +143,12 @@ class Design:
     def errors(self) -> Errors | None:
         """How far the prediction is from the target; None without one."""
         return None if self.target is None else compare(self.prediction.points, self.target.curve)
+
+    @cached_property
+    def further_errors(self) -> tuple[Errors, ...]:
+        """How far the predictions are from the target's further shapes."""
+        shapes = () if self.target is None else self.target.shapes
+        return tuple(compare(line.points, s.curve) for line, s in zip(self.further_predictions, shapes))
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
@@ -169,7 +185,11 @@ class Design:
         ]
 
     def _predicted(self, pressure):
-        return predict(self.manipulator, pressure, self.law, base_pose=self.content.base_pose)
+        content = self.content
+        if not content.loads:
+            return predict(self.manipulator, pressure, self.law, base_pose=content.base_pose)
+        rod = Rod.of(self.manipulator, self.law, pressure, content.base_pose)
+        return rod.equilibrium(content.loads, tolerance=LOADED).line
 
     def save(self, directory: str | Path) -> Path:
         """`write` to a folder, which is made if need be; the folder. InputError where a run is at work in
@@ -179,14 +199,16 @@ class Design:
         return folder
 
     def write(self, directory: Path) -> None:
-        """Write design.toml, centreline.csv, run.json, with a target target.csv and with matplotlib
-        design.png. InputError where it cannot be written to."""
+        """Write design.toml, centreline.csv, run.json, with a target target.csv and split.toml, with
+        matplotlib design.png. InputError where it cannot be written to."""
         from pneunet.base.pictures import rendering
 
         content, line = self.content, self.prediction
         if self.target is not None:
             write_csv(directory / "target.csv", POINT, self.target.points)
             content = replace(content, target="target.csv")
+            if content.result.get("piece"):
+                write_text(directory / "split.toml", SPLIT + piece_tables(content.result["piece"]))
         write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
         write_design_file(directory / "design.toml", content)
         versions = {"numpy": np.__version__, "scipy": scipy.__version__}
@@ -203,6 +225,25 @@ class Design:
         from pneunet.design.report.pictures import design_figure
 
         return design_figure(self.content, self.prediction, self.target, self.errors)
+
+    def export(self, directory: str | Path, moulds: "Moulds | str | Path | None" = None) -> Path:
+        """Write what a workshop needs to cast it to directory/workshop, the path of which is returned: STEP
+        and STL of the body and its moulds, a sheet as HTML and PDF.
+
+        moulds: printer, draft, clearances, ..., or a TOML file of them. A finite element solution of this
+        body in the folder tells the limits of the pressure. InputError where moulds or files are wrong.
+        """
+        from pneunet.design.report.rundata import read_design_folder
+        from pneunet.design.workshop.export import read_moulds, write_pack
+
+        if isinstance(moulds, (str, Path)):
+            moulds = read_moulds(moulds)
+        solved = None
+        if (Path(directory) / "design.toml").exists():
+            there = read_design_folder(directory)
+            same = there.design.manipulator == self.manipulator and there.design.shares == self.content.shares
+            solved = there.solve if same else None
+        return write_pack(self.content, directory, self.law, moulds, solved)
 
     def solve(
         self,

@@ -65,7 +65,9 @@ def inverse_design(
         log.info(f"  {text}")
     found = search(target, asked.pieces, law, objective)
     best = found.best
-    content = DesignFile(best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose)
+    content = DesignFile(
+        best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose, loads=target.loads
+    )
     effort = {
         "inputs": {"target": target.source or target.name, "objective": objective},
         "evaluations": found.evaluations,
@@ -85,6 +87,7 @@ def inverse_design(
             "active_bounds": list(found.active),
             "flush_underside_costs_mm": round(found.flush_costs, 4),
             "target_error": design.errors.table() if design.errors else {},
+            "shape_error": [e.table() for e in design.further_errors],
             "tolerances": spread.table(),
             "alternative": [_table(c) for c in found.alternatives],
             "piece": [
@@ -110,7 +113,7 @@ def as_target(target: Target | str | Path | np.ndarray) -> Target:
     """A Target from itself, from its file or from points (n, 3) in mm; InputError for one that cannot be."""
     if isinstance(target, Target):
         return target
-    return Target.read(target) if isinstance(target, str | Path) else Target(np.asarray(target, float))
+    return Target.read(target) if isinstance(target, str | Path) else Target(target)
 
 
 def run_design(
@@ -165,6 +168,10 @@ def summary(design: Design) -> Iterator[str]:
     if design.errors:
         yield "errors of the reduced prediction:"
         yield from ("  " + text for text in design.errors.lines())
+    shapes = design.target.shapes if design.target else ()
+    for i, (shape, e) in enumerate(zip(shapes, design.further_errors), start=1):
+        told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
+        yield f"shape {i} at {KPA_PER_MPA * shape.pressures[0]:.2f} kPa: {told}"
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"
@@ -190,7 +197,7 @@ def answer(design: Design) -> Iterator[str]:
         of_its_own = "no bound stops it: few pieces of constant strain do not follow this curve"
         stopped = design.stopped_by or of_its_own
         yield f"NOT followed: {100 * errors.not_followed:.0f} % of length; {rms}; {stopped}"
-    if spread.law_rms is None:
+    if spread.law_rms is None or spread.law_tip is None:
         yield f"how far the real body may be: the law '{design.law.name}' does not know"
     else:
         rms, tip = np.hypot(spread.law_rms, spread.mesh_rms), np.hypot(spread.law_tip, spread.mesh_tip)

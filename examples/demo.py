@@ -1,4 +1,5 @@
-"""The whole chain on the octopus target: design, shape, mesh, finite elements on 2 ranks, report.
+"""The whole chain on a raw curve, the octopus as points and section frames: design, shape, mesh, finite
+elements on 2 ranks, report.
 
 Run by `make demo`; each link is the command a user would type.
 """
@@ -27,7 +28,7 @@ def main():
     design = str(OUT / "design.toml")
     # an earlier design's, perhaps an earlier version's
     shutil.rmtree(ROOT / OUT / "solve", ignore_errors=True)
-    step("design", "design/data/octopus.toml", "-o", str(OUT))
+    step("design", "examples/curves/octopus.csv", "-o", str(OUT))
     step("shape", design)
     step("mesh", design)
     # a load that cannot be reached leaves the result up to there, and the report says so

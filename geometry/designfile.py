@@ -35,9 +35,10 @@ class DesignFile(Checked):
 
     pressure in MPa: one for all, or a tuple of one for each group of segments; base_pose (4, 4): the base
     frame in the target's coordinates (mm); mesh_size in mm; element: tetrahedra of gmsh's or hexahedra of a
-    grid; target: text that names the target file; result: free table of numbers that `pneunet design` adds and nobody reads back. loads, control, measure and
-    contact ('auto': walls of neighbouring chambers that touch are held apart; 'none': they are not) are for
-    the finite elements alone; a pressure of 0 everywhere goes with loads only.
+    grid; target: text that names the target file; result: free table of numbers that `pneunet design` adds
+    and nobody reads back. loads, control, measure and contact ('auto': walls of neighbouring chambers that
+    touch are held apart; 'none': they are not) are for the finite elements alone; a pressure of 0 everywhere
+    goes with loads only.
     """
 
     manipulator: Manipulator

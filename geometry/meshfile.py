@@ -1,6 +1,7 @@
 """Meshes of tetrahedra or hexahedra as plain arrays: what CAD and grids write and finite elements read. Data,
 never code."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -90,6 +91,15 @@ class VolumeMesh:
     def tagged(self, tag: int) -> np.ndarray:
         """Facets (n, 3) or (n, 4) with this tag."""
         return self.facets[self.facet_tags == tag]
+
+    def require_tags(self, layered: Sequence[bool], groups: int) -> None:
+        """InputError unless cells and facets have the tags of a body whose segments are `layered` or not, of
+        so many pressure groups."""
+        cells = {tags.BODY + i for i in range(len(layered))}
+        cells |= {tags.LAYER + i for i, layer in enumerate(layered) if layer}
+        known, met = set(tags.face_names(groups)), set(self.facet_tags.tolist())
+        if set(self.cell_tags.tolist()) != cells or not met <= known or not known - {tags.OUTER} <= met:
+            raise InputError(f"its tags are not those of this body: {AGAIN}")
 
     def write(self, path: str | Path, facts: dict[str, Any]) -> None:
         """Write an .npz; facts: what is known of the mesh, a table for JSON."""

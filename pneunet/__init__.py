@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from pneunet.front import segment as segment
     from pneunet.front import view as view
     from pneunet.geometry.loading import DeadLoads as DeadLoads
+    from pneunet.geometry.moulds.parameters import Moulds as Moulds
     from pneunet.geometry.parameters import Manipulator as Manipulator
     from pneunet.geometry.parameters import Segment as Segment
     from pneunet.reduced.rod.centreline import Centreline as Centreline
@@ -63,6 +64,7 @@ _PLACES = {
     "InputError": "base.errors",
     "Manipulator": "geometry.parameters",
     "MeasuredComparison": "design.measured.comparison",
+    "Moulds": "geometry.moulds.parameters",
     "Results": "base.files.results",
     "Rod": "reduced.rod.rod",
     "RodPiece": "reduced.rod.rod",

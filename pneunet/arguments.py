@@ -43,6 +43,8 @@ def real(text: str) -> float:
 
 def path(text: str) -> Path:
     """A name that a file can have."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name is empty: a variable that is not set?")
     if not text.isprintable() or max(len(part.encode()) for part in Path(text).parts or ("",)) > 255:
         raise argparse.ArgumentTypeError("no file is called so: control characters, or over 255 in a name")
     if len(text) > 3000:
@@ -58,7 +60,8 @@ def pressures(text: str, least: float = math.ulp(0.0)) -> list[float]:
         if math.isnan(value):
             raise argparse.ArgumentTypeError(f"'{word}' is not a number; write for instance 10,20,30")
         if not least <= value <= LARGEST_PRESSURE_KPA:
-            raise argparse.ArgumentTypeError(f"{value:g} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
+            allowed = f"0..{LARGEST_PRESSURE_KPA:g} kPa" + ", 0 left out" * bool(least)
+            raise argparse.ArgumentTypeError(f"{value:g} must lie in {allowed}")
         values.append(value)
     return values
 
@@ -152,17 +155,23 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_law(a, "trained")
     add_output(a, "out/NAME of the file, out/workspace without one")
 
-    a = add("mesh", "CAD (STEP) and tagged tetrahedral mesh, with volumes and checks")
+    a = add("mesh", "CAD (STEP) and tagged mesh, with volumes and checks")
     a("design", type=path)
-    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
     add_output(a, "the design's folder")
+
+    a = add("export", "everything to cast it: STEP and STL of body and moulds, a sheet for the workshop")
+    a("design", type=path)
+    text = "printer, draft, clearances, ...; default: a bed of 220 mm and straight walls"
+    a("--moulds", type=path, metavar="MOULDS.toml", help=text)
+    add_output(a, "the design's folder; the pack is in its folder workshop")
 
     text = "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml"
     a = add("solve", text)
     a("design", type=path)
     text = "default: the design's; 0: its [loads] alone"
     a("--pressure-kPa", type=one_pressure, dest="pressure", help=text)
-    a("--mesh-size-mm", type=mesh_size, help="tetrahedron edge; default: the design's")
+    a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
     a("--no-fields", action="store_true", help="write no ParaView files")
     text = "go on from the last accepted step of a run that was ended, on any ranks"
     a("--resume", action="store_true", help=text)

@@ -48,6 +48,13 @@ def mesh(a: Namespace) -> None:
     mesh_design(a.design, a.output or a.design.parent, a.mesh_size_mm)
 
 
+def export(a: Namespace) -> None:
+    from pneunet.front import read_design
+
+    folder = a.design if a.design.is_dir() else a.design.parent
+    read_design(a.design).export(a.output or folder, a.moulds)
+
+
 def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
@@ -148,6 +155,7 @@ COMMANDS = {
     "shape": shape,
     "workspace": workspace,
     "mesh": mesh,
+    "export": export,
     "solve": solve,
     "cell": cell,
     "study": study,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.toml import from_table
 from pneunet.base.materials.laws import Hyperelastic, material_from_table
 from pneunet.base.units import each_in_MPa
@@ -65,7 +66,7 @@ def predict(
     law has no equilibrium. What makes the law doubt its answer is logged.
     """
     law, pressure = chosen_law(law), each_in_MPa(pressure_kPa)
-    line = prediction.predict(manipulator, pressure, law, base_pose=base_pose)
+    line = prediction.predict(manipulator, pressure, law, base_pose=_pose(base_pose))
     tell_doubts(prediction.doubts(manipulator, [pressure], law), law, WARN)
     return line
 
@@ -83,7 +84,17 @@ def rod(
     pressure_kPa: one for all, or one for each group of segments. InputError where a pressure or their number
     is wrong.
     """
-    return Rod.of(manipulator, chosen_law(law), each_in_MPa(pressure_kPa), base_pose)
+    return Rod.of(manipulator, chosen_law(law), each_in_MPa(pressure_kPa), _pose(base_pose))
+
+
+def _pose(given):
+    """A base's frame (4, 4), or None; InputError for anything else."""
+    pose = np.eye(4) if given is None else np.asarray(given)
+    finite = pose.shape == (4, 4) and pose.dtype.kind in "fi" and np.isfinite(pose).all()
+    R = pose[:3, :3] if finite else np.zeros((3, 3))
+    if abs(R.T @ R - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0 or (pose[3] != [0, 0, 0, 1]).any():
+        raise InputError("base_pose must be (4, 4): a rotation, an origin in mm, and a last row 0, 0, 0, 1")
+    return given
 
 
 def report(directory: str | Path, law: str | SegmentLaw | None = None) -> Path:

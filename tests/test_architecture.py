@@ -24,7 +24,7 @@ FLOORS = {
 #: what lies in the package itself
 ROOMS = {
     "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
-    "geometry": [{""}, {"grids"}, {"cad"}],
+    "geometry": [{""}, {"grids", "moulds"}, {"cad"}],
     "hifi": [
         {"fem"},
         {"path"},
@@ -36,7 +36,7 @@ ROOMS = {
         {"verification"},
     ],
     "reduced": [{"rod"}, {"analytic", "trained"}, {""}, {"training"}],
-    "design": [{"target"}, {"segmentation"}, {"search"}, {"report"}, {""}, {"measured"}],
+    "design": [{"target"}, {"segmentation"}, {"search"}, {"report"}, {"workshop"}, {""}, {"measured"}],
 }
 #: what only these packages' modules may import; all else (matplotlib, pyvista) is for the inside of functions
 SOLVERS = {"dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"}
@@ -54,7 +54,8 @@ NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
 BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
-BLOCKED |= {"plotly", "fcntl", "resource"}  # of Linux and macOS alone
+BLOCKED |= {"trimesh", "manifold3d", "plotly"}
+BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:
     def find_spec(self, name, path=None, target=None):

@@ -164,11 +164,11 @@ def test_installed_it_designs_and_predicts(python, folder):
     assert told_version == f"pneunet {revision}\n" and re.fullmatch(r"[\d.]+", revision)
 
 
-@pytest.mark.parametrize("command", ["solve", "mesh", "cell", "study", "campaign"])
+@pytest.mark.parametrize("command", ["solve", "mesh", "export", "cell", "study", "campaign"])
 def test_what_needs_more_says_what_to_install(python, folder, command):
     design = ROOT / "hifi" / "verification" / "data" / "reference.toml"
     done = run(python.with_name("pneunet"), command, design, "-o", "out", cwd=folder, code=2)
     assert done.stderr.count("\n") == 1 and done.stdout == ""
     assert done.stderr.startswith("pneunet: ") and " is missing here: " in done.stderr
-    assert ("pip install gmsh" if command == "mesh" else "make setup") in done.stderr
+    assert ("pip install gmsh" if command in ("mesh", "export") else "make setup") in done.stderr
     assert not any(path.name != ".git" and any(path.iterdir()) for path in folder.iterdir())

@@ -73,7 +73,7 @@ class CellData:
     first_touch: np.ndarray = column(
         "cases", (), "f4", "P/mu at which walls touch; nan: not met or not looked for", gaps=True
     )
-    cells: np.ndarray = column("cases", (), "i4", "tetrahedra")
+    cells: np.ndarray = column("cases", (), "i4", "elements")
     unknowns: np.ndarray = column("cases", (), "i4", "of the cell")
     seconds: np.ndarray = column("cases", (), "f4", "of CPU that the case took")
     missing: np.ndarray = column("cases", (), "i1", "prescribed states that were not reached")

@@ -18,6 +18,9 @@ PATIENCE_SECONDS = 5.0
 #: what file systems that know no locks say; there a run is not kept from another one's folder
 NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
 
+#: folders of this process and which of them, and of those above, it has made
+_held: dict[Path, list[Path]] = {}
+
 
 @contextmanager
 def output_folder(path: str | Path) -> Iterator[Path]:
@@ -41,15 +44,27 @@ def output_folder(path: str | Path) -> Iterator[Path]:
         raise InputError(
             f"{path}: another run is at work in it: wait for that, or choose another folder with -o"
         )
+    _held[path] = made
     try:
         yield path
     finally:
-        with suppress(OSError):  # Windows keeps what is open; a folder stays when something is in it
-            (path / LOCK).unlink()
+        _leave(path, _held.pop(path))
         os.close(handle)
-        with suppress(OSError):
-            for each in made:
-                each.rmdir()
+
+
+def leave_all() -> None:
+    """Leave the folders of this process, and nothing half-written in them, as it ends within a block."""
+    for path, made in reversed(_held.items()):
+        remove_leftovers(path)
+        _leave(path, made)
+
+
+def _leave(path, made):
+    with suppress(OSError):  # Windows keeps what is open
+        (path / LOCK).unlink()
+    with suppress(OSError):  # a folder stays when something is in it
+        for each in made:
+            each.rmdir()
 
 
 def lock(path: Path) -> int | None:

@@ -1,10 +1,11 @@
-"""Triangles of STL files, binary or text, as data: nothing else of them is kept."""
+"""Triangles of STL files, read from binary or text and written as binary: nothing else of them is kept."""
 
 from pathlib import Path
 
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.files.atomic import atomic_path
 from pneunet.base.files.reading import MB, read_bytes
 
 LARGEST_STL = 100 * MB
@@ -41,3 +42,15 @@ def _of_text(path, data):
     if len(corners) % 3 or corners.shape[1] != 3:
         raise InputError(f"{path}: holds vertices that make no triangles: export it again as STL")
     return corners.reshape(-1, 3, 3)
+
+
+def write_stl(path: str | Path, triangles: np.ndarray, name: str = "") -> None:
+    """Write triangles (m, 3, 3), outward, as a binary STL; name: what it is, of which 60 characters are
+    kept."""
+    records = np.zeros(len(triangles), _RECORD)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    records["normal"] = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    records["corners"] = triangles
+    head = f"pneunet, mm: {name[:60]}".encode("ascii", "replace").ljust(80)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(head + len(triangles).to_bytes(4, "little") + records.tobytes())

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
+from pneunet.base.files.folder import leave_all
 from pneunet.base.system.log import complain, under_launcher
 
 #: as which a launcher hands them on, again and again: mpirun kills its ranks soon after the others
@@ -100,9 +101,22 @@ def _interrupt():
 
 
 @contextmanager
+def kept() -> Iterator[None]:
+    """Handlers of signals are after the block what they were before it: gmsh takes Ctrl-C for itself."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            for number, its in before.items():
+                if its is not None:  # None: a library's own
+                    signal.signal(number, its)
+
+
+@contextmanager
 def at_once() -> Iterator[None]:
     """For a library that works long within one call and lets other threads run: a signal of the block ends
-    the process, which has nothing to tell yet, without waiting for the call's end."""
+    the process, which has nothing to tell yet and leaves nothing, without waiting for the call's end."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -112,6 +126,7 @@ def at_once() -> Iterator[None]:
     def watch():
         while number := os.read(told, 1):
             if number[0] in SIGNALS:
+                leave_all()
                 complain("interrupted")
                 os._exit(EXIT_CODE)
         os.close(told)
@@ -119,7 +134,7 @@ def at_once() -> Iterator[None]:
     before = signal.set_wakeup_fd(tell)
     threading.Thread(target=watch, daemon=True).start()
     try:
-        with handled(lambda *_: None):  # gmsh takes Ctrl-C for itself
+        with handled(lambda *_: None):
             yield
     finally:
         signal.set_wakeup_fd(before)

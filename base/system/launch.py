@@ -46,6 +46,19 @@ SETTINGS = {
 #: more than this is a slip of the pen, which would bring the machine down
 RANKS_PER_CORE = 64
 HEARING_SECONDS = 0.3
+#: sub-commands whose ranks would all do the same
+SERIAL = (
+    "design",
+    "shape",
+    "mesh",
+    "cell",
+    "suggest",
+    "report",
+    "fit-material",
+    "doctor",
+    "compare",
+    "export",
+)
 
 
 def environment() -> dict[str, str]:
@@ -71,6 +84,8 @@ def command_line(ranks: int, command: list[str]) -> list[str]:
         raise InputError(
             "run: no command given: pneunet run -n 2 solve DESIGN.toml, or pneunet run -n 2 -- PROGRAM ..."
         )
+    if ranks > 1 and command[0] in SERIAL:
+        raise InputError(f"run: pneunet {command[0]} works on one rank: leave out run -n {ranks}")
     return ["mpirun", "-n", str(ranks), *program]
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from pneunet.base.errors import InputError
+from pneunet.base.system.interrupts import deferred, is_interrupted
 
 _SOLVERS = (
     "pip does not bring finite elements; on Debian 12 or 13 run 'make setup' in a checkout of pneunet,"
@@ -15,6 +16,7 @@ _PICTURES = "install it with: pip install 'pneunet[pictures]'"
 MISSING = {
     **dict.fromkeys(("dolfinx", "ufl", "basix", "ffcx", "mpi4py", "petsc4py"), _SOLVERS),
     **dict.fromkeys(("pyvista", "vtk", "vtkmodules", "matplotlib", "PIL"), _PICTURES),
+    **dict.fromkeys(("trimesh", "manifold3d"), "install it with: pip install 'pneunet[moulds]'"),
     **dict.fromkeys(("fcntl", "resource"), "this runs on Linux alone; elsewhere use the container image"),
     **dict.fromkeys(("plotly", "imageio_ffmpeg"), _VIEW),
     "gmsh": "install it with: pip install gmsh (in a checkout on Debian: make setup)",
@@ -31,3 +33,13 @@ def told_what_to_install() -> Iterator[None]:
         if name not in MISSING:
             raise
         raise InputError(f"{name} is missing here: {MISSING[name]}") from None
+
+
+def load_vtk() -> None:
+    """Load pyvista before it is used. Interrupted while it loads VTK, it would lose the signal or crash: the
+    signal is heeded at the end."""
+    with deferred():
+        import pyvista  # noqa: F401
+
+        if is_interrupted():
+            raise KeyboardInterrupt

@@ -133,7 +133,7 @@ class Scene:
         if solve is not None and solve.solution is not None:
             solved = deformed_surface(read_solution(solve.solution), design.base_pose)
         rest = body_mesh(design.manipulator, 0.0, law, design.base_pose)
-        held = [body.points for body in (reduced, solved and solved[0]) if body is not None]
+        held = [np.asarray(body.points) for body in (reduced, solved and solved[0]) if body is not None]
         held += [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
         return cls(reduced, rest, solved, view_of(np.vstack(held or [rest.points])))
 

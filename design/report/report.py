@@ -12,6 +12,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import revision
+from pneunet.base.system.libraries import load_vtk
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report import figures
 from pneunet.design.report.bodies import Scene, read_solution
@@ -75,7 +76,9 @@ def write_report(directory: str | Path, law: SegmentLaw | None = None) -> Path:
     law: a SegmentLaw, by default the one that the folder was designed with. Shows what is there: without a
     mesh or a finite element solution it says so. InputError without design.toml.
     """
-    run = _with_sound_fields(read_design_folder(directory))
+    found = read_design_folder(directory)
+    load_vtk()
+    run = _with_sound_fields(found)
     for text in run.damaged:
         log.warning(f"warning: left out of the report: {text}")
     law = choose_law(run.law) if law is None else law

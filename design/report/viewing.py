@@ -194,7 +194,7 @@ def _controls(figure, steps, keys, last):
             }
             for key in keys
         ]
-        menus.append(row | {"x": 0.0, "y": 1.07, "buttons": colours})
+        menus.append(row | {"x": 0.0, "y": 1.1, "buttons": colours})
     everything = np.vstack([*steps.points, *([] if steps.target is None else [steps.target])])
     low, high = everything.min(axis=0), everything.max(axis=0)
     margin = 0.03 * (high - low).max()

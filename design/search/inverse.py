@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.base.curve import Curve
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, PAIRS, Aim
+from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.lookup import Guess, first_guesses
 from pneunet.design.search.problem import Body, Evaluation, Problem
 from pneunet.design.search.space import Variable, grid, limits, prototype, variables_of
-from pneunet.design.search.whole import on_grid, optimised, with_whole_chambers
+from pneunet.design.search.whole import STEPS, TRIED, on_grid, optimised, with_whole_chambers
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import PRESSURE_LIMIT, Target
 from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
@@ -119,11 +118,19 @@ def _guesses(target, pieces, prototypes, law):
         varying = limits(target, piece, segment)
         angles.append(grid(varying.get("angle"), 90.0, 5.0))
         heights.append(grid(varying.get("chamber_height"), segment.chamber_height, 1.0))
+    if len(target.pressures) > 1:
+        raise InputError("pressure_kPa: a design has one pressure for all segments: give one")
     low, high = target.pressure_range or (0.010, PRESSURE_LIMIT)
+    if target.weights is not None and not target.weights.any():  # the curve is a guide to the last tip point
+        low = high = max([float(s.pressures[0]) for s in target.shapes] + _tip_pressures(target))
     pressures = (
         np.linspace(low, high, max(1, round((high - low) / 0.010)) + 1) if high > low else np.array([low])
     )
     return first_guesses(pieces, prototypes, angles, heights, pressures, law)
+
+
+def _tip_pressures(target):
+    return [] if target.tip is None else target.tip.pressures.tolist()
 
 
 def shortest(segment: Segment) -> float:
@@ -141,13 +148,14 @@ class _Search:
     def __init__(self, target, pieces, law, objective, most):
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
         self.optima = []
-        self.most = most if objective == PAIRED else 0
+        self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
+        self.most = most if objective == PAIRED and not self.loaded else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
 
     def run(self, guesses):
         problem, optimum = self._from_guesses(guesses)
         if self.objective == EQ27:
-            aims = (Aim.of(self.target, problem.body.segments[0].width, EQ27),)
+            aims = Aim.all_of(self.target, problem.body.segments[0].width, EQ27)
             problem, optimum = self._counted(optimised(replace(problem, aims=aims), self.floor))
         log.info(f"real-valued optimum: {_told(problem, optimum)}")
         flush = self._flush_costs(problem, optimum)
@@ -187,9 +195,9 @@ class _Search:
             raise ConvergenceError(f"the law has no equilibrium at {least:.1f} kPa: lower the pressure")
         return best
 
-    def _try(self, problem):
+    def _try(self, problem, steps=30):
         """Its local optimum to the others'."""
-        found = optimised(problem, self.floor)
+        found = optimised(problem, self.floor, steps)
         if found is not None:
             self.evaluations += found[1].evaluations
             self.optima.append(found)
@@ -198,7 +206,7 @@ class _Search:
     def _flush_costs(self, problem, optimum):
         """By how much (mm) the root mean square would fall if undersides need not be flush."""
         joined = [v for v in problem.variables if v.name == "base_thickness" and len(v.segments) > 1]
-        if not joined:
+        if not joined or self.loaded:
             return 0.0
         apart = tuple(replace(v, segments=(i,)) for v in joined for i in v.segments)
         kept = tuple(v for v in problem.variables if v not in joined)
@@ -210,14 +218,14 @@ class _Search:
 
     def _grid(self):
         casting = self.target.casting
-        names = ("wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall")
-        names += ("cavity_thickness", "gap", "end_margin", "plain_length")
+        names = ["wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall"]
+        names += ["cavity_thickness", "gap", "end_margin", "plain_length"]
         steps = dict.fromkeys(names, casting.grid or 0.001)
         return {"angle": casting.angle_grid or 0.01} | steps
 
-    def _whole(self, problem, optimum):
+    def _whole(self, problem, optimum, tried=TRIED):
         """With whole numbers of chambers."""
-        found = with_whole_chambers(problem, optimum, self.floor)
+        found = with_whole_chambers(problem, optimum, self.floor, tried)
         self.evaluations += sum(o.evaluations for _, o in found)
         if not found:
             raise ConvergenceError("no whole numbers of chambers near the optimum can be built")
@@ -238,7 +246,8 @@ class _Search:
 
     def _alternatives(self, best, whole, guesses):
         """Distinct Candidates that are not much worse."""
-        found, allowed = [], max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+        found: list[Candidate] = []
+        allowed = max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
         for other in self._others(whole, guesses) if self.most else ():
             if np.sqrt(other[1].at.misfit) > allowed:
                 continue
@@ -257,12 +266,12 @@ class _Search:
         for problem, optimum in sorted(self.optima, key=lambda found: found[1].cost):
             if min(abs(problem.body.pressures[0, 0] - P) for P in seen) >= APART:
                 seen.append(problem.body.pressures[0, 0])
-                yield self._whole(problem, optimum)
+                yield self._whole(problem, optimum, tried=1)
         apart = [g for g in guesses[:ALTERNATIVES] if min(abs(g.pressure - P) for P in seen) >= APART]
         for guess in apart:
             first = start(self.target, self.pieces, self.law, guess)
-            if found := self._try(_held_near(first, guess.pressure)):
-                yield self._whole(*found)
+            if found := self._try(_held_near(first, guess.pressure), STEPS):
+                yield self._whole(found[0], found[1], tried=1)
         body = whole[0].body
         longest = int(np.argmax(body.counts))
         for change in (1, -1):
@@ -286,12 +295,13 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     """The Problem at an entry of the lookup table, with the base turned to the target."""
     segments, n = guess.segments, len(pieces)
     variables = variables_of(target, pieces, segments, not target.casting.allow_steps)
-    everyone = tuple(range(n))
-    if target.pressure_range is None:
-        variables.append(Variable("pressure", everyone, LEAST_PRESSURE, PRESSURE_LIMIT, 0.02))
-    elif target.pressure_range[1] > target.pressure_range[0]:
-        low, high = target.pressure_range
-        variables.append(Variable("pressure", everyone, low, high, high - low))
+    aims = Aim.all_of(target, segments[0].width)
+    pressures = np.array([guess.pressure if aim.pressure is None else aim.pressure for aim in aims])
+    if aims[0].pressure is None:
+        low, high = target.pressure_range or (LEAST_PRESSURE, PRESSURE_LIMIT)
+        if high > low:
+            scale = high - low if target.pressure_range else 0.02
+            variables.append(Variable("pressure", tuple(range(n)), low, high, scale))
     for i, count in enumerate(guess.counts):
         if segments[i].kind == PASSIVE:
             continue
@@ -301,26 +311,26 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     body = Body(
         segments,
         np.array(guess.counts),
-        np.full((1, n), guess.pressure),
+        np.tile(pressures[:, None], (1, n)),
         _some_rotation(target),
         target.points[0],
     )
     # flush undersides, and values within their ranges
     values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
     body = body.changed(variables, values)
-    aims = (Aim.of(target, segments[0].width),)
-    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns), target)
+    gravity = np.array(target.gravity)
+    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns, gravity))
 
 
-def _turned_to_target(problem, target):
+def _turned_to_target(problem):
     """The base turned about its free axes to bring the present curve nearest to the target, in closed
     form."""
     free, body = problem.turns.shape[1], problem.body
     at = problem.evaluate(problem.x)
     if at is None or not free:
         return problem
-    points = (Curve(at.shapes[0].placed.points).evenly(PAIRS) - body.origin) @ body.rotation
-    wanted = (target.curve.evenly(PAIRS) - target.points[0]) @ body.rotation
+    aim, placed = problem.aims[0], at.shapes[0].placed
+    points, wanted = ((a - body.origin) @ body.rotation for a in (placed.points, aim.points))
     moment = points.T @ wanted
     if free == 1:
         turn = se3.exp_rotation(

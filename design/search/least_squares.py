@@ -15,14 +15,17 @@ from scipy.optimize import lsq_linear
 #: damping of scaled steps at the start, relative to the Jacobian's; the range it is kept in
 DAMPING, LEAST, MOST = 1e-3, 1e-7, 1e6
 #: the search ends when a step promises less than these shares of the cost
-ENOUGH = 1e-4
+ENOUGH = 1e-3
 
 
 class Linearised(Protocol):
     """What a residual is near x: residual (m,), jacobian (m, n)."""
 
-    residual: np.ndarray
-    jacobian: np.ndarray
+    @property
+    def residual(self) -> np.ndarray: ...
+
+    @property
+    def jacobian(self) -> np.ndarray: ...
 
 
 L = TypeVar("L", bound=Linearised)

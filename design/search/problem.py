@@ -2,7 +2,7 @@
 wanted, and how that changes with every variable, exactly."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,9 +14,9 @@ from pneunet.design.search.aims import Aim
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
 from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
-from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.analytic.clearance import gap_left_and_slopes
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.loaded_slopes import loaded
 from pneunet.reduced.rod.piece_slopes import (
     FIELD_AT,
     FIELDS,
@@ -24,8 +24,9 @@ from pneunet.reduced.rod.piece_slopes import (
     cell_states,
     cells_length_by,
     piece_twists,
+    strain_slopes,
 )
-from pneunet.reduced.rod.placing import Placed, PlacedRod
+from pneunet.reduced.rod.placing import PlacedRod, Stations
 from pneunet.reduced.rod.states import StatesWithSlopes
 
 #: mm of misfit per mm that facing walls would overlap: contact is not designed into
@@ -79,12 +80,17 @@ class Body:
 @dataclass(frozen=True, eq=False)
 class Shape:
     """One shape of a Body and how it changes: placed stations; turns, moves (s, 3, n, fields): their
-    derivatives by FIELDS of every segment; states: of the cells."""
+    derivatives by FIELDS of every segment; base_turns, base_moves (s, 3, 3): by turns of the base about the
+    axes of space, besides those of a rigid body; states: of the cells; strain_moves (s, 3, n, 6): derivatives
+    of the points by the cells' free strains, where they were asked for."""
 
-    placed: Placed
+    placed: Stations
     turns: np.ndarray
     moves: np.ndarray
+    base_turns: np.ndarray
+    base_moves: np.ndarray
     states: StatesWithSlopes
+    strain_moves: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +108,8 @@ class Evaluation:
 @dataclass(frozen=True, eq=False)
 class Problem:
     """The problem around a Body: variables, then turns of the base about axes (the columns of `turns` (3, t),
-    in base axes) are what is sought. everything: derivatives by fields that do not vary are wanted too."""
+    in base axes) are what is sought. gravity (3,) in mm/s2; everything: derivatives by fields
+    that do not vary are wanted too."""
 
     aims: tuple[Aim, ...]
     pieces: tuple[Extracted, ...]
@@ -110,6 +117,7 @@ class Problem:
     variables: tuple[Variable, ...]
     body: Body
     turns: np.ndarray
+    gravity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     everything: bool = False
 
     @cached_property
@@ -149,17 +157,28 @@ class Problem:
 
     def _shape(self, body, number, aim):
         n, pressures = len(body.segments), body.pressures[number]
-        names = SHAPE if self.everything else {v.name for v in self.variables}
+        names = FIELDS if self.everything else {v.name for v in self.variables}
         states = cell_states(self.law, body.segments, pressures, names)
         by_laws = states.strains_by[:, :, : len(OF_LAWS)]
-        twists, by = piece_twists(body.segments, states.strains, by_laws, body.counts)
+        by_base = by_strains = None
+        if self.gravity.any():
+            found = loaded(
+                body.segments, body.counts, self.law, pressures, body.base_pose, self.gravity, names
+            )
+            twists, by, by_base, by_strains = found.twists, found.by, found.by_turn, found.by_strains
+        else:
+            twists, own = piece_twists(body.segments, states.strains, by_laws, body.counts)
+            by = _spread(own, n)
+            if self.everything:
+                by_strains = _spread(strain_slopes(body.segments, states.strains, body.counts), n)
         placed = aim.stations(PlacedRod(twists, body.base_pose))
-        by, s = by.reshape(n, 18, -1), len(placed.poses)
-        turns, moves = (
-            np.moveaxis(a.reshape(3 * s, n, 18).swapaxes(0, 1) @ by, 0, 1).reshape(s, 3, n, -1)
-            for a in (placed.turns, placed.moves)
-        )
-        return Shape(placed, turns, moves, states)
+        turns, moves = _chained(placed.turns, by), _chained(placed.moves, by)
+        if by_base is None:
+            base_turns = base_moves = np.zeros((len(moves), 3, 3))
+        else:
+            base_turns, base_moves = _chained(placed.turns, by_base), _chained(placed.moves, by_base)
+        strain_moves = _chained(placed.moves, by_strains) if self.everything else None
+        return Shape(placed, turns, moves, base_turns, base_moves, states, strain_moves)
 
     def columns(self, by_fields: np.ndarray, aim: int) -> np.ndarray:
         """(..., n) derivatives by x, those of the base 0, from those (..., segments, fields) of one shape."""
@@ -174,8 +193,8 @@ class Problem:
         turns, moves = self.columns(shape.turns, number), self.columns(shape.moves, number)
         if omega.shape[1]:
             count = len(self.variables)
-            turns[:, :, count:] = omega
-            moves[:, :, count:] = -se3.hat(placed.points - body.origin) @ omega
+            turns[:, :, count:] = omega + shape.base_turns @ omega
+            moves[:, :, count:] = (shape.base_moves - se3.hat(placed.points - body.origin)) @ omega
         return aim.misfit(placed), aim.slopes(placed, turns, moves)
 
     def _doubts(self, number, shape):
@@ -225,3 +244,18 @@ class Problem:
         for row, (j, _, weight) in zip(slopes, drawn):
             row[j] = weight
         return np.array([weight * (x[j] - start) for j, start, weight in drawn]), slopes
+
+
+def _spread(own, n):
+    """(3 n, 6, n, c) derivatives by every segment, of those (3 n, 6, c) of pieces by their own segment."""
+    out = np.zeros((*own.shape[:2], n, own.shape[2]))
+    pieces = np.arange(len(own))
+    out[pieces, :, pieces // 3] = own
+    return out
+
+
+def _chained(by_twists, twists_by):
+    """(s, 3, ...) of derivatives (s, 3, 6 m) by twists and theirs (m, 6, ...)."""
+    s, _, count = by_twists.shape
+    flat = by_twists.reshape(3 * s, count) @ twists_by.reshape(count, -1)
+    return flat.reshape(s, 3, *twists_by.shape[2:])

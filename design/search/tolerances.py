@@ -12,7 +12,7 @@ from pneunet.design.target.casting import Casting
 from pneunet.geometry.parameters import ONE_SIDED, PASSIVE, TWISTING, Segment
 from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.piece_slopes import FIELD_AT, OF_LAWS, piece_twists
+from pneunet.reduced.rod.piece_slopes import FIELD_AT
 
 #: mm, degrees, kPa, of the modulus: what effects are told of
 PER_LENGTH, PER_ANGLE, PER_PRESSURE, PER_MODULUS = 0.1, 1.0, 1.0, 0.01
@@ -108,7 +108,7 @@ def _sizes(moves):
 def _of_the_law(body, shape, law):
     """(RMS, tip) in mm of the law, half of 90 % intervals, each strain's error independent of the others', or
     None; (RMS, tip) of the mesh, whose error is the same everywhere."""
-    squares, by_strains = np.zeros(2), strain_moves(body, shape)
+    squares, by_strains = np.zeros(2), shape.strain_moves
     share = np.array([MESH.get(s.kind, 0.0) for s in body.segments])
     of_mesh = _sizes(
         np.einsum("sxnj,nj->sx", by_strains, share[:, None] * (shape.states.strains - np.eye(6)[0]))
@@ -122,20 +122,6 @@ def _of_the_law(body, shape, law):
         for j in range(6):
             squares += np.square(_sizes(half[j] * by_strains[:, :, i, j]))
     return tuple(float(a) for a in (*np.sqrt(squares), *of_mesh))
-
-
-def strain_moves(body: Body, shape: Shape) -> np.ndarray:
-    """(s, 3, n, 6): derivatives of a Shape's points by the free strains of every segment."""
-    n = len(body.segments)
-    unit, none = np.zeros((2, n, 6, len(OF_LAWS)))
-    unit[:, range(6), range(6)] = 1.0
-    # of strains alone: what lengths do on their own is in both
-    with_strains, without = (
-        piece_twists(body.segments, shape.states.strains, a, body.counts)[1] for a in (unit, none)
-    )
-    by = (with_strains - without)[..., OF_LAWS[:6]].reshape(n, 18, 6)
-    moves = shape.placed.moves
-    return np.moveaxis(moves.reshape(-1, n, 18).swapaxes(0, 1) @ by, 0, 1).reshape(len(moves), 3, n, 6)
 
 
 def largest(effects: Sequence[Effect], count: int) -> list[Effect]:

@@ -15,6 +15,8 @@ from pneunet.design.search.space import Variable
 #: numbers of chambers that are tried beyond the most promising ones, and the cost over that of real-valued
 #: ones at which the search for others stops
 TRIED, GOOD_ENOUGH = 3, 1.2
+#: evaluations from real-valued optima on, which are near
+STEPS = 12
 #: whole numbers of chambers that are looked at
 MOST_COMBINATIONS = 4096
 #: rounded first, while all others are still free to make up for it
@@ -32,7 +34,9 @@ def optimised(problem: Problem, floor: float, steps: int = 30) -> Found | None:
     return None if found is None else (replace(problem, body=found.at.body), found)
 
 
-def with_whole_chambers(problem: Problem, optimum: Optimum[Evaluation], floor: float) -> list[Found]:
+def with_whole_chambers(
+    problem: Problem, optimum: Optimum[Evaluation], floor: float, tried: int = TRIED
+) -> list[Found]:
     """The Problem with whole numbers of chambers that are no variables any more, optimised, best first; from
     a real-valued optimum of it."""
     of_chambers = [j for j, v in enumerate(problem.variables) if v.name == "chambers"]
@@ -44,18 +48,19 @@ def with_whole_chambers(problem: Problem, optimum: Optimum[Evaluation], floor: f
         return [found] if found else []
     span = np.linalg.qr(J[:, free])[0]
     left, slopes = r - span @ (span.T @ r), J[:, of_chambers] - span @ (span.T @ J[:, of_chambers])
-    around = [
-        sorted({max(1, int(np.floor(x[j]))), max(1, int(np.ceil(x[j])))}, key=lambda n, j=j: abs(n - x[j]))
-        for j in of_chambers
-    ]
+    around = []
+    for value in x[of_chambers].tolist():
+        nearest = max(1, round(value))
+        other = max(1, int(np.floor(value)) + int(np.ceil(value)) - nearest)
+        around.append([nearest] if other == nearest else [nearest, other])
     combinations = np.array(list(islice(product(*around), MOST_COMBINATIONS)), float)
     promised = np.sum((left[:, None] + slopes @ (combinations - x[of_chambers]).T) ** 2, axis=0)
     done: list[Found] = []
-    for counts in combinations[np.argsort(promised, kind="stable")[:TRIED]]:
+    for counts in combinations[np.argsort(promised, kind="stable")[:tried]]:
         body = replace(problem.body, counts=problem.body.counts.copy())
         for j, n in zip(of_chambers, counts):
             body.counts[list(problem.variables[j].segments)] = n
-        found = optimised(replace(problem, variables=variables, body=body), floor)
+        found = optimised(replace(problem, variables=variables, body=body), floor, STEPS)
         if found:
             done.append(found)
             if found[1].cost <= max(GOOD_ENOUGH * optimum.cost, floor):
@@ -90,7 +95,7 @@ def _rounded(problem, optimum, chosen, grid, floor):
     values = [x[places[v]] for v in chosen]
     body = problem.body.changed(chosen, np.array(values))
     kept = tuple(v for v in problem.variables if v not in chosen)
-    return optimised(replace(problem, variables=kept, body=body), floor)
+    return optimised(replace(problem, variables=kept, body=body), floor, STEPS)
 
 
 class _Linear:

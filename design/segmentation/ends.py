@@ -8,8 +8,9 @@ sum (f_i - s_i)^2/noise^2 + sum (s_(i+1) - s_i - mean)^2/spread^2 least: one tri
 import numpy as np
 from scipy.linalg import solveh_banded
 
-#: of the mean step: a smaller spread of the steps is not believed, where points come ever denser
-EVEN = 0.1
+#: of the mean step: a smaller spread of the steps is not believed. It is a difference of large numbers where
+#: noise is larger than the steps, and one that is too small puts the ends where even steps would.
+EVEN = 0.5
 
 
 def ends(feet: np.ndarray, noise: float) -> tuple[float, float]:

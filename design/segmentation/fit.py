@@ -22,6 +22,8 @@ STRAIN = 0.03  # 1/mm, standard deviation of strains before any point is seen
 #: mm by which a piece is too short that counts as one standard deviation: in the search, at its end
 SOFT, FIRM = 0.1, 0.01
 PIECE = 4.0  # price of a piece in the criterion, -2 log of its prior odds
+ASTRAY = 0.4  # of the length: feet further from where their points are along the curve are wrong
+ENOUGH = 2500  # steps, some two seconds
 #: largest steps: rad, mm (start and joints), 1/mm
 CAPS = (0.5, 20.0, 0.02)
 #: (k1 free, k2 free) -> kind
@@ -33,20 +35,31 @@ KINDS = {
 }
 
 
+@dataclass
+class Effort:
+    """Steps of Levenberg and Marquardt that a split has taken; above ENOUGH nothing further is tried."""
+
+    steps: int = 0
+
+    @property
+    def spent(self) -> bool:
+        return self.steps > ENOUGH
+
+
 @dataclass(frozen=True, eq=False)
 class Observations:
     """What a rod is fitted to: points (n, 3), mm, with noise (standard deviation of a coordinate, mm) and,
     where given, frames (n, 3, 3), the section frame base (3, 3) at the first point, weights (n,), 1 on
     average.
 
-    length: of the curve, mm. lever: mm at which turns of frames are measured. shortest: length of a piece,
-    mm, which slack lets it miss. reach: {kind: (largest |k1|, largest |k2|)} in 1/mm; a kind that is not
-    named has no limits.
+    places (n,): first arc lengths of the points, mm. lever: mm at which turns of frames are measured.
+    shortest: length of a piece, mm, which slack lets it miss. reach: {kind: (largest |k1|, largest |k2|)} in
+    1/mm; a kind that is not named has no limits. noise_seen: the points were enough to tell the noise.
     """
 
     points: np.ndarray
     noise: float
-    length: float
+    places: np.ndarray
     frames: np.ndarray | None = None
     base: np.ndarray | None = None
     weights: np.ndarray | None = None
@@ -54,6 +67,13 @@ class Observations:
     shortest: float = 20.0
     slack: float = SOFT
     reach: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    noise_seen: bool = True
+    effort: Effort = field(default_factory=Effort)
+
+    @property
+    def length(self) -> float:
+        """Of the curve, mm."""
+        return float(self.places[-1])
 
     @property
     def joint_price(self) -> float:
@@ -167,6 +187,12 @@ class RodFit:
                     gradient += row * lacking / data.slack**2
                     curvature += np.outer(row, row) / data.slack**2
         return cost, gradient, curvature
+
+    @property
+    def sound(self) -> bool:
+        """Whether joints are in order and feet about where their points are along the curve."""
+        off = np.ptp(self.feet - self.data.places)
+        return bool((np.diff(self.rod.joints) > 1.0).all() and off < max(ASTRAY * self.data.length, 20.0))
 
     @property
     def kinds(self) -> list[str]:
@@ -323,9 +349,10 @@ def refined(fit: RodFit, steps: int = 30, enough: float = 0.02) -> RodFit:
             step = np.linalg.solve(curvature + np.diag(damping * diagonal), gradient)
             step = capped(step, len(fit.free) - 1)
             trial = fit.stepped(step)
-            if (np.diff(trial.rod.joints) > 1.0).all() and abs(trial.away[:, 0]).max() > 0.2:
+            if trial.sound and abs(trial.away[:, 0]).max() > 0.2:
                 trial = trial.settled()
-            gain = fit.cost - trial.cost if (np.diff(trial.rod.joints) > 1.0).all() else -np.inf
+            gain = fit.cost - trial.cost if trial.sound else -np.inf
+            fit.data.effort.steps += 1
             if gain > 0:
                 break
             if damping > 1e3 or -gain < enough:

@@ -8,6 +8,7 @@ from pneunet.design.segmentation.fit import FIRM, RodFit, refined
 from pneunet.design.segmentation.moves import HOPE, allowed, merged, moves, without
 from pneunet.design.segmentation.rod import PiecewiseRod
 
+FEW = 8  # ways tried in which a rod may have a piece less
 TRIES = 20  # moves tried before a rod is taken for the best
 BETTER = 0.02  # of the criterion: a smaller gain is none
 ROUNDS = 40
@@ -45,15 +46,19 @@ def _fewer(fit, pieces):
         if move.piece in pieces or (move.name == "merge" and move.piece + 1 in pieces)
     ]
     good = [move for move, free in options if allowed(free, framed, based)] or [move for move, _ in options]
-    good = sorted(good, key=lambda m: -m.gain)[:TRIES]
+    good = sorted(good, key=lambda m: -m.gain)[: 2 if fit.data.effort.spent else FEW]
     return min((untwisted(refined(move.made())) for move in good), key=lambda f: f.criterion)
 
 
 def _climbed(fit, most):
     """As far as single moves lead."""
     for _ in range(ROUNDS):
+        if fit.data.effort.spent:
+            break
         options = [m for m in moves(fit, most) if m.gain > HOPE]
         for move in sorted(options, key=lambda m: -m.gain)[:TRIES]:
+            if fit.data.effort.spent:
+                return fit
             trial = untwisted(refined(move.made()))
             if trial.criterion < fit.criterion - BETTER:
                 fit = trial

@@ -67,19 +67,19 @@ def fitted(
     data = Observations(
         points,
         floor,
-        length,
+        s,
         frames=frames,
         base=target.base_rotation,
         weights=weights,
         shortest=shortest,
     )
     stretches = Stretches(points, s, floor, shortest, frames)
-    data = replace(data, noise=stretches.noise)
+    data = replace(data, noise=stretches.noise, noise_seen=stretches.noise_seen)
     if target.pieces:
         fit = refined(_given(target, data, s), POLISH, 1e-4)
     else:
         fit = found(data, stretches, options.most_pieces)
-        said = _noise(fit, floor)
+        said = _noise(fit, floor, options.most_pieces)
         if said != (data.noise, data.lever):
             # what the whole rod leaves says more than what the shortest stretches do
             data = replace(data, noise=said[0], lever=said[1])
@@ -106,10 +106,12 @@ def _given(target, data, s):
     return RodFit(data, replace(rod, start=start), free, s)
 
 
-def _noise(fit, floor):
+def _noise(fit, floor, most):
     """(noise, lever) that a fit speaks for; those that were assumed where they will do, or where the points
     are too far from any rod to say anything."""
     noise, lever = fit.data.noise, fit.data.lever
+    if (fit.lengths < fit.data.shortest + 1.0).any() or len(fit.free) == most:
+        return noise, lever  # it may be the limits that keep it away
     left = max(fit.noise, floor)
     if 0.5 < left / noise < 2.0 and not 0.8 < left / noise < 1.25:
         noise = left

@@ -1,13 +1,17 @@
 """`Segmentation`: the rod of few pieces of constant strain that a target was found to lie on."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pneunet.base.curve import Curve
 from pneunet.base.units import PER_MM_PER_M
-from pneunet.design.target.target import BENDING, HELICAL, Piece
-from pneunet.geometry.parameters import TWISTING
+from pneunet.design.target.file import PIECE_KEYS
+from pneunet.design.target.target import Piece
+
+#: of a [[piece]] table, in the order in which they are written
+KEYS = ("kind", "length_mm", "roll_deg", "curvature_per_m", "tau_rad_per_mm", "torsion_rad_per_m")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,21 +48,24 @@ class Segmentation:
 
     def toml(self) -> str:
         """The pieces as [[piece]] tables of a target's file, to be edited and given back."""
-        return "\n".join(_table(piece) for piece in self.pieces)
+        return piece_tables([_row(piece) for piece in self.pieces])
 
     def __repr__(self) -> str:
         told = ", ".join(f"{p.kind}{' (rolled)' * bool(p.roll)} {p.length:.1f} mm" for p in self.pieces)
         return f"<Segmentation: {told}; rms {self.rms:.3f} mm, noise {self.noise:.3f} mm>"
 
 
-def _table(piece):
-    rows = {"kind": f'"{piece.kind}"', "length_mm": f"{piece.length:.3f}"}
-    curved, turned = piece.kind in (BENDING, HELICAL), piece.kind in (TWISTING, HELICAL)
-    if curved and piece.roll:
-        rows["roll_deg"] = f"{piece.roll:g}"
-    if curved and piece.curvature:
-        rows["curvature_per_m"] = f"{piece.curvature / PER_MM_PER_M:.4f}"
-    if turned and piece.twist is not None:
-        key, unit = ("tau_rad_per_mm", 1.0) if piece.kind == TWISTING else ("torsion_rad_per_m", PER_MM_PER_M)
-        rows[key] = f"{piece.twist / unit:.7g}"
-    return "[[piece]]\n" + "".join(f"{key} = {value}\n" for key, value in rows.items())
+def piece_tables(rows: Sequence[Mapping]) -> str:
+    """[[piece]] tables of a target's file from rows by file key, of which what such a file knows is kept."""
+    texts = []
+    for row in rows:
+        keys = [key for key in KEYS if key in row and key in PIECE_KEYS[row["kind"]]]
+        values = (f'"{row[key]}"' if key == "kind" else f"{row[key]:.7g}" for key in keys)
+        texts.append("[[piece]]\n" + "".join(f"{key} = {value}\n" for key, value in zip(keys, values)))
+    return "\n".join(texts)
+
+
+def _row(piece):
+    row = {"kind": piece.kind, "length_mm": piece.length, "curvature_per_m": piece.curvature / PER_MM_PER_M}
+    row |= {"tau_rad_per_mm": piece.twist, "torsion_rad_per_m": piece.twist / PER_MM_PER_M}
+    return row | ({"roll_deg": piece.roll} if piece.roll else {})

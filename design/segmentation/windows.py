@@ -88,6 +88,7 @@ class Stretches:
         self.index[-1] = len(s)
         self.feet = np.tile(s, (count, 1))
         self.noise = self.estimate = floor
+        self.noise_seen = False
         self.found: dict[tuple[int, int], Stretch] = {}
         least = max(1, int(np.ceil(min(shortest, s[-1]) / (s[-1] / count) - 0.1)))
         self._start(s, least)
@@ -106,7 +107,10 @@ class Stretches:
                 self._fit(fitted, cells, FIRST_STEPS)
             fits = [self.found[a, a + cells] for a in fitted]
             hopeful = [f.square < self.noise**2 * (f.left + HOPELESS) for f in fits]
-            active = np.sort(np.concatenate([active[~some], fitted[np.array(hopeful, bool)]]))
+            if cells >= 2 * least - 1:  # below, every length is needed for stretches to fill the curve
+                active = np.sort(np.concatenate([active[~some], fitted[np.array(hopeful, bool)]]))
+        if (0, count) not in self.found:
+            self._fit(np.zeros(1, int), count, FIRST_STEPS)
 
     def _start(self, s, least):
         """First poses, at the middles of the first stretches, and strains from quadratics."""
@@ -216,6 +220,7 @@ class Stretches:
     def _estimate_noise(self, floor):
         """From the median of what the shortest stretches leave; those across a joint leave more."""
         spread = [f.square / f.left for f in self.found.values() if f.left >= 5]
+        self.noise_seen = bool(spread)
         if spread:
             left = np.median([f.left for f in self.found.values() if f.left >= 5])
             usual = (1 - 2 / (9 * left)) ** 3  # median of chi squared over its degrees of freedom

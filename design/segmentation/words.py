@@ -25,6 +25,8 @@ def told(fit: RodFit, pieces: Sequence[Piece], target: Target, options: SplitOpt
     framed = data.frames is not None
     if len(target.points) > len(data.points):
         yield thinned(len(target.points))
+    if not data.noise_seen:
+        yield f"too few points to tell their noise: {data.noise:.2g} mm is assumed; tolerance_mm says it"
     for i, (piece, length) in enumerate(zip(pieces, fit.lengths)):
         name = f"piece {i + 1}"
         if piece.kind == PASSIVE and not framed:

@@ -62,6 +62,8 @@ class Extracted:
     def table(self) -> dict:
         """By file key; the paper's and Frenet's numbers by their own names."""
         out = {"kind": self.kind, "length_mm": self.length} | rates(self.kind, self.strains)
+        if self.roll:
+            out["roll_deg"] = self.roll
         return out | {"fit_rms_mm": self.fit_rms} | ({"note": self.note} if self.note else {})
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.quantities import shown
 from pneunet.geometry.designfile import FARTHEST
 
 #: more are not needed by any curve that a body can follow
@@ -17,7 +18,10 @@ FOLD = np.cos(np.radians(150.0))
 def checked_points(points: object) -> np.ndarray:
     """Points as floats; InputError unless they are (n >= 4, 3), finite, without repeats, of a length that can
     be built, and neither closed nor folded back."""
-    points = np.asarray(points, float)
+    try:
+        points = np.asarray(points, float)
+    except (TypeError, ValueError):
+        raise InputError(f"points must be rows of x, y, z in mm, not {shown(points)}") from None
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"points must be rows of x, y, z in mm, not an array of shape {points.shape}")
     if len(points) < 4:

@@ -14,7 +14,7 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.system.interrupts import at_once
+from pneunet.base.system.interrupts import at_once, kept
 from pneunet.geometry import tags
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.geometry.sections import channel_section
@@ -25,7 +25,8 @@ _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
 @contextmanager
 def session(name: str = "pneunet") -> Iterator[Any]:
     """A gmsh session with one empty model; quiet, and closed whatever happens."""
-    gmsh.initialize(readConfigFiles=False)  # no options from the working directory or home
+    with kept():
+        gmsh.initialize(readConfigFiles=False)  # no options from the working directory or home
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.add(name)

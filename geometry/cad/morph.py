@@ -1,13 +1,14 @@
 """A cell's body carried over to one of slightly other dimensions: the mesh of the one becomes a mesh of the
 other.
 
-All faces of a cell are planes: across X3, across X2, or slanted walls, which are planes across X1 - X2
-cot(angle). A map that is piecewise linear in each of these coordinates takes the planes of one cell to those
-of another.
+All faces of a cell are planes across X3, across X2 or across xi = X1 less the chambers' lean
+(geometry.grids.planes). A map that is piecewise linear in each of these coordinates takes the planes of one
+cell to those of another, and its grid to the other's.
 """
 
 import numpy as np
 
+from pneunet.geometry.grids.planes import lean
 from pneunet.geometry.parameters import TWISTING, Segment
 
 
@@ -20,23 +21,11 @@ def moved(points: np.ndarray, segment: Segment, other: Segment) -> np.ndarray:
     x, y, z = points.T
     new_y = np.interp(y, _both(_sideways(segment)), _both(_sideways(other)))
     new_z = np.interp(z, *_planes(_heights(segment), _heights(other)))
-    if segment.kind == TWISTING:
-        # the two sets of chambers lean to opposite sides; between them, in the channel's height, nothing is
-        # slanted
-        above = (1 + np.clip(z / segment.cavity_floor, -1, 1)) / 2
-        new_x = sum(
-            w * _along(x, y, new_y, segment, other, side) for w, side in ((above, 1), (1 - above, -1))
-        )
-    else:
-        new_x = _along(x, y, new_y, segment, other, 1)
-    return np.column_stack([new_x, new_y, new_z])
-
-
-def _along(x, y, new_y, segment, other, side):
-    along = x - side * segment.cot * y
-    number = np.round(along / segment.pitch)
-    within = np.interp(along - number * segment.pitch, _both(_walls(segment)), _both(_walls(other)))
-    return within + number * other.pitch + side * other.cot * new_y
+    xi = x - lean(segment, y, z)
+    number = np.round(xi / segment.pitch)
+    within = np.interp(xi - number * segment.pitch, _both(_walls(segment)), _both(_walls(other)))
+    new_xi = within + number * other.pitch
+    return np.column_stack([new_xi + lean(other, new_y, new_z), new_y, new_z])
 
 
 def _both(values):

@@ -32,7 +32,8 @@ def cell_grid(
         y = y[y > -1e-9]
     z = upright(s, size).divided(size, layer)
     middles = [(a[1:] + a[:-1]) / 2 for a in (xi, y, z)]
-    kinds = contents(s, *np.meshgrid(*middles, indexing="ij", sparse=True), gaps=gaps)
+    places = np.meshgrid(*middles, indexing="ij", sparse=True)
+    kinds = contents(s, places[0], places[1], places[2], gaps=gaps)
     ends: dict[tuple[int, int], int | None] = {(0, -1): None, (0, 1): None}
     if part and twisting:
         ends[1, -1] = None

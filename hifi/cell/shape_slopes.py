@@ -48,12 +48,15 @@ class ShapeSlopes:
         problem.placement = home
         rates = np.array(rates).T
         inner, slope = rates[:-6], rates[-6:]
-        A, C = system.influence, system.condensed
-        strains = -np.linalg.solve(C, slope - A.T @ inner)
+        A, C, free = system.influence, system.condensed, problem.classes[0].strains
+        strains = np.zeros_like(slope)
+        strains[free] = -np.linalg.solve(C[np.ix_(free, free)], (slope - A.T @ inner)[free])
         if not stiffness:
             return strains.T, None
         ways = np.vstack([-system.solve_inner(inner) - A @ strains, strains])
-        Z, here, slopes = np.vstack([-A, np.eye(6)]), C / problem.segment.pitch, []
+        others = [system.of_class(number) for number in range(1, len(problem.classes))]
+        here = (C + sum(condensed for _, condensed, _ in others)) / problem.segment.pitch
+        Z, slopes = [np.vstack([-a, np.eye(6)]) for a in [A, *(influence for influence, _, _ in others)]], []
         for placement, step, way in zip(self._moved, self.steps, ways.T):
             problem.placement = placement
             system.state = state + step * way
@@ -72,7 +75,11 @@ class ShapeSlopes:
         return inner, slope + problem.gauge_strains.T @ multipliers
 
     def _second_derivatives(self, Z):
-        """(6, 6) Z^T H Z."""
-        matrix, mixed, curvature = self.problem.tangent()
-        mixed = Z[:-6].T @ np.vstack([mixed, self.problem.gauge_strains])
-        return Z[:-6].T @ (matrix @ Z[:-6]) + mixed + mixed.T + curvature
+        """(6, 6) sum of Z^T H Z over the classes of symmetry, each with its Z."""
+        total = np.zeros((6, 6))
+        for number, (each, z) in enumerate(zip(self.problem.classes, Z)):
+            tangent = self.problem.tangent_of(number) if number else self.problem.tangent()
+            matrix, mixed, curvature = tangent
+            mixed = z[:-6].T @ np.vstack([mixed, each.gauge_strains * each.strains])
+            total += z[:-6].T @ (matrix @ z[:-6]) + mixed + mixed.T + curvature
+        return total

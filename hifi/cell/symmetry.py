@@ -242,4 +242,6 @@ class BorderedPattern:
             place = np.searchsorted(self._keys, key)
         entries = np.concatenate([data[self._keep] * self._signs, self._border, values])
         summed = np.bincount(np.concatenate([self._place, place]), entries, len(self._keys))
-        return sp.csr_matrix((summed, self._indices, self._indptr), shape=(self._size, self._size))
+        matrix = sp.csr_matrix((summed, self._indices, self._indptr), shape=(self._size, self._size))
+        matrix.indices, matrix.indptr = self._indices, self._indptr  # not views, which would be new ones
+        return matrix

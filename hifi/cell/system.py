@@ -104,7 +104,7 @@ class CellSystem:
         )
         self._inner = sum(problem.gauge.shape)
         self._x = np.concatenate([np.zeros(self._inner), self._strains[0]])
-        self._solver = self._matrix = self._pattern = None
+        self._solver, self._factors = None, [_Factor() for _ in problem.classes]
         self._factorisations = 0
         self.walls = problem.walls
         self.load = 0.0
@@ -173,14 +173,7 @@ class CellSystem:
         d2Pi/du d(e,k); condensed (6, 6): d2Pi/d(e,k)2 with the rest in equilibrium, N mm a pitch and so
         on."""
         matrix, mixed, self._curvature = self.problem.tangent()
-        if self._pattern is not matrix.indices:
-            self._release()
-            self._pattern = matrix.indices
-            self._matrix, self._solver = _solver(matrix)
-        else:
-            self._matrix.setValuesCSR(matrix.indptr, matrix.indices, matrix.data)
-            self._matrix.assemble()
-        self._solver.factorise()
+        self._solver = self._factors[0].of(matrix)
         self._factorisations += 1
         self._mixed = np.vstack([mixed, self.problem.gauge_strains])
         self._mixed *= self.problem.classes[0].strains
@@ -257,7 +250,7 @@ class CellSystem:
         self.factorise()
         stiffness, unstable = self.condensed.copy(), self.unstable
         for number in range(1, len(self.problem.classes)):
-            part, more = self._other_class(number)
+            _, part, more = self.of_class(number)
             stiffness += part
             unstable += more
         _, slope = self._parts()
@@ -277,35 +270,49 @@ class CellSystem:
             self.problem.array.copy(),
         )
 
-    def _other_class(self, number):
-        """(what another class adds to `condensed`, its unstable directions) at the factorised state."""
+    def of_class(self, number: int) -> tuple[np.ndarray, np.ndarray, int]:
+        """(influence, condensed, unstable directions) of another class of symmetry at the factorised
+        state."""
         each = self.problem.classes[number]
         matrix, mixed, curvature = self.problem.tangent_of(number)
         mixed = np.vstack([mixed, each.gauge_strains * each.strains])
-        assembled, solver = _solver(matrix)
-        try:
-            solver.factorise()
-            condensed = curvature - mixed.T @ solver.solve_many(mixed)
-            own = condensed[np.ix_(each.strains, each.strains)]
-            unstable = solver.negative_pivots - each.constraints - each.gauge.shape[1]
-            return condensed, unstable + int(np.count_nonzero(np.linalg.eigvalsh(own) < 0))
-        finally:
-            solver.destroy()
-            assembled.destroy()
+        solver = self._factors[number].of(matrix)
+        influence = solver.solve_many(mixed)
+        condensed = curvature - mixed.T @ influence
+        own = condensed[np.ix_(each.strains, each.strains)]
+        unstable = solver.negative_pivots - each.constraints - each.gauge.shape[1]
+        return influence, condensed, unstable + int(np.count_nonzero(np.linalg.eigvalsh(own) < 0))
 
-    def _release(self):
+    def destroy(self) -> None:
+        for factor in self._factors:
+            factor.release()
+
+
+class _Factor:
+    """The factorised matrix of a class of symmetry; what its pattern has cost is kept."""
+
+    def __init__(self):
+        self._pattern = self._matrix = self._solver = None
+
+    def of(self, matrix):
+        """DirectSolver that has factorised a symmetric CSR matrix, of the same `indices` while its pattern is
+        the same."""
+        if self._pattern is matrix.indices:
+            self._matrix.setValuesCSR(matrix.indptr, matrix.indices, matrix.data)
+            self._matrix.assemble()
+        else:
+            self.release()
+            self._pattern = matrix.indices
+            self._matrix = PETSc.Mat().createAIJ(
+                matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
+            )
+            self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+            self._solver = DirectSolver(self._matrix, MPI.COMM_SELF)
+        self._solver.factorise()
+        return self._solver
+
+    def release(self):
         if self._solver is not None:
             self._solver.destroy()
             self._matrix.destroy()
-
-    def destroy(self) -> None:
-        self._release()
-
-
-def _solver(matrix):
-    """(PETSc's matrix of a symmetric CSR one, its DirectSolver)."""
-    made = PETSc.Mat().createAIJ(
-        matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
-    )
-    made.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return made, DirectSolver(made, MPI.COMM_SELF)
+            self._solver = None

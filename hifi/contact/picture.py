@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.system.libraries import load_vtk
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry import tags
 from pneunet.hifi.contact.walls import CellWalls, distances_from
@@ -24,6 +25,7 @@ def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> b
     from pneunet.base.pictures.rendering import edges
     from pneunet.base.pictures.walls import FIELD, TOUCHING, draw_walls
 
+    load_vtk()
     kept = problem.strains.value.copy()
     problem.strains.value[:] = state.strains.vector
     try:

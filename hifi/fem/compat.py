@@ -11,14 +11,17 @@ import ffcx
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.io import gmshio
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from pneunet.base.system.interrupts import kept
 from pneunet.geometry import meshfile
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.fem.form_cache import form_cache, locked_form_cache
+
+with kept():
+    from dolfinx.io import gmshio  # which loads gmsh
 
 OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
 #: sums may be reordered and pow need not set errno, so that loops over quadrature points vectorise: residuals
@@ -56,11 +59,21 @@ def _compiler(comm: MPI.Comm) -> Iterator[None]:
             logging.disable(before)
 
 
+def _name_spacing(domain):
+    """Say of a mesh that its nodes are equally spaced, as gmsh's are said to be. ffcx does so when it has
+    compiled a form, and from then on all forms of the mesh have other names and would be compiled again."""
+    element = domain.ufl_coordinate_element()
+    if element.sub_elements()[0].variant() is None:
+        node = ufl.FiniteElement(element.family(), element.cell(), element.degree(), variant="equispaced")
+        domain._ufl_coordinate_element = ufl.VectorElement(node)
+
+
 def mixed_space(mesh: Mesh, degree: int = 2) -> fem.FunctionSpace:
     """Taylor-Hood space: vector P(degree) displacement times P(degree-1) pressure; on hexahedra
     Q."""
     with _compiler(mesh.comm):
         if OLD:
+            _name_spacing(mesh.ufl_domain())
             u = ufl.VectorElement("CG", mesh.ufl_cell(), degree)
             p = ufl.FiniteElement("CG", mesh.ufl_cell(), degree - 1)
             return fem.FunctionSpace(mesh, ufl.MixedElement([u, p]))

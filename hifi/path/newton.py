@@ -25,8 +25,9 @@ SHORTENINGS = 4
 #: what a new tangent, and an updated one, must make of the residual where walls touch for the tangent to be
 #: updated further
 TANGENT_GAIN, UPDATE_GAIN = 0.2, 0.5
-#: tangents factorised for one step, after which it should have come closer where walls touch
-MOST_IN_CONTACT = 6
+#: tangents factorised for one step, after which it should have come closer: beyond a limit point there is
+#: nothing to come to
+MOST_TANGENTS = 6
 
 
 @dataclass
@@ -99,9 +100,9 @@ class Newton:
                 self.factorise()
                 renewed, fresh = True, True
                 factorised += 1
-                if factorised > MOST_IN_CONTACT and system.overreach > 0 and norm > 0.1 * history[0]:
+                if factorised > MOST_TANGENTS and norm > 0.1 * history[0]:
                     raise NotConverged(
-                        f"residual {norm:.1e} N after {factorised} tangents: what touches does not settle"
+                        f"residual {norm:.1e} N after {factorised} tangents, none of which helps"
                     )
             if renewed:
                 secants.forget()

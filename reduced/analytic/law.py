@@ -5,8 +5,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from pneunet.base.errors import InputError
 from pneunet.base.strains import RodStrains
-from pneunet.geometry.parameters import TWISTING, Segment
+from pneunet.geometry.parameters import KINDS, TWISTING, Segment
 from pneunet.reduced.analytic.helical import HelicalCell
 from pneunet.reduced.analytic.twisting import TwistingTube
 from pneunet.reduced.rod.areas import equivalent_radii
@@ -22,7 +23,12 @@ class AnalyticLaw(SegmentLaw):
         self._sections = lru_cache(maxsize=256)(AnalyticSection)
 
     def of(self, segment: Segment) -> "AnalyticSection":
-        """InputError for a one-sided segment whose cavity does not rise above the core."""
+        """InputError for a one-sided segment whose cavity does not rise above the core, and for a passive
+        one."""
+        if segment.kind not in KINDS:
+            raise InputError(
+                f"kind = '{segment.kind}': laws are of chambers; a rod takes this one as bare core"
+            )
         return self._sections(segment.key)
 
 

@@ -81,6 +81,10 @@ class RodElements:
         """(n, 6) section moments (N mm) and forces (N) in the section frames."""
         return self._by_law("force", x, (6,))[:, TWIST_ORDER]
 
+    def stiffnesses(self, x: np.ndarray) -> np.ndarray:
+        """(n, 6, 6) tangent stiffness of the sections, moments and forces by (k, e)."""
+        return self._by_law("stiffness", x, (6, 6))[:, TWIST_ORDER[:, None], TWIST_ORDER]
+
     def poses(self, x: np.ndarray) -> np.ndarray:
         """(n + 1, 4, 4) frames of the nodes."""
         return self._chained(se3.exp_pose(x * self.lengths[:, None]))
@@ -101,7 +105,7 @@ class RodElements:
         inverse = np.linalg.inv(self._h * (Ad @ J.matrix))
         outward, turned, forces = _outward(poses[1:], loads)
         local = (_transposed(Ad) @ outward[..., None])[..., 0]
-        material = self._by_law("stiffness", x, (6, 6))[:, TWIST_ORDER[:, None], TWIST_ORDER]
+        material = self.stiffnesses(x)
         own = self._h * (material - self._h * J.slope(local))
         M = _transposed(inverse) @ own @ inverse
         inward = (_transposed(inverse) @ (self.lengths[:, None] * self.wrenches(x))[..., None])[..., 0]
@@ -118,21 +122,47 @@ class RodElements:
         """(step (n, 6) for x, banded matrix in LAPACK's storage for `is_minimum`); None instead of the step
         when singular."""
         inverse, blocks, imbalance = self._linearised(x, loads)
-        n = len(x)
-        # LAPACK's columns are these rows: entry (r, c) at [c, 2 _BAND + r - c]
-        band = np.zeros((6 * n, 3 * _BAND + 1))
-        size, width = band.itemsize, band.shape[1]
-        for block, first in zip(blocks, (2 * _BAND, 2 * _BAND + 6, 6 * width + 2 * _BAND - 6)):
-            as_strided(
-                band.ravel()[first:], (len(block), 6, 6), (6 * width * size, size, (width - 1) * size)
-            )[...] = block
+        band = _banded(blocks)
         kept = band[:, 2 * _BAND :].copy()
         _, _, V, info = dgbsv(_BAND, _BAND, band.T, -imbalance.ravel(), overwrite_ab=True)
         if info:
             return None, kept
-        V = V.reshape(n, 6)
+        V = V.reshape(len(x), 6)
         V[1:] -= V[:-1].copy()
         return (inverse @ V[..., None])[..., 0], kept
+
+    def responses(
+        self, x: np.ndarray, loads: NodalLoads, wrenches: np.ndarray, loading: np.ndarray
+    ) -> np.ndarray | None:
+        """(n, 6, c): how an equilibrium's twists over whole elements, lengths times x (n, 6), answer to c
+        changes, by the implicit function theorem; None where the tangent is singular.
+
+        wrenches (n, 6, c): changes of the section wrenches at unchanged twists over whole elements; loading
+        (n, 6, c): of the loads' wrenches about the origin of space at the nodes.
+        """
+        inverse, blocks, _ = self._linearised(x, loads)
+        n, c = len(x), wrenches.shape[2]
+        inward = _transposed(inverse) @ (self._h * wrenches)
+        inward[:-1] -= inward[1:].copy()
+        _, _, V, info = dgbsv(_BAND, _BAND, _banded(blocks).T, (loading - inward).reshape(6 * n, c))
+        if info:
+            return None
+        V = V.reshape(n, 6, c)
+        V[1:] -= V[:-1].copy()
+        return self._h * (inverse @ V)
+
+
+def _banded(blocks):
+    """LAPACK's banded storage, transposed, of block tridiagonal `blocks` (diagonal, lower, upper)."""
+    n = len(blocks[0])
+    # LAPACK's columns are these rows: entry (r, c) at [c, 2 _BAND + r - c]
+    band = np.zeros((6 * n, 3 * _BAND + 1))
+    size, width = band.itemsize, band.shape[1]
+    for block, first in zip(blocks, (2 * _BAND, 2 * _BAND + 6, 6 * width + 2 * _BAND - 6)):
+        as_strided(band.ravel()[first:], (len(block), 6, 6), (6 * width * size, size, (width - 1) * size))[
+            ...
+        ] = block
+    return band
 
 
 def is_minimum(band: np.ndarray) -> bool:

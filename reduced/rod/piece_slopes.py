@@ -73,6 +73,16 @@ def piece_twists(
     return lengths[:, None] * strains.twist_vector, by.reshape(-1, 6, len(FIELDS))
 
 
+def strain_slopes(segments: Sequence[Segment], free: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """(3 n, 6, 6) derivatives of `piece_twists` by the free strains of their own segment's cells."""
+    n, none = len(segments), np.zeros((len(segments), 6, len(OF_LAWS)))
+    unit = none.copy()
+    unit[:, range(6), range(6)] = 1.0
+    # what lengths do on their own is in both
+    with_strains, without = (piece_twists(segments, free, a, counts)[1] for a in (unit, none))
+    return (with_strains - without)[:, :, OF_LAWS[:6]].reshape(3 * n, 6, 6)
+
+
 def cells_length_by(segment: Segment, count: float) -> np.ndarray:
     """(fields,) derivatives of the length (mm) of `count` cells."""
     out = np.zeros(len(FIELDS))

@@ -97,23 +97,7 @@ class Rod:
                 raise InputError(f"laws: {type(law).__name__} is no SegmentLaw, such as choose_law() gives")
         if len(laws) != n:
             raise InputError(f"laws: give one for all or one for each of the {n} segments")
-        pressures = manipulator.pressures(pressure)
-        cells = cell_strains(laws, segments, pressures)
-        lengths, strains = free_pieces(segments, cells, end_effects=end_effects)
-        pieces: list[RodPiece] = []
-        known: dict[tuple[Segment, int, float], SectionLaw] = {}
-        for i, (length, q) in enumerate(zip(lengths.tolist(), strains.vector)):  # three of each segment
-            segment, P = segments[i // 3], float(pressures[i // 3])
-            turn = rotation(segment)
-            if i % 3 == 1 and segment.kind != PASSIVE:
-                mass, z = active_mass(segment)
-                section: SectionLaw = _turned(laws[i // 3].of(segment), segment)
-            else:
-                (mass, z), P, bend = passive_mass(segment), 0.0, float(turn[:, 2] @ q[3:])
-                alike = segment.key, segment.roll, bend
-                section = known.setdefault(alike, _turned(passive_law(segment, bend), segment))
-            y, z = (turn[1:, 2] * z).tolist()
-            pieces.append(RodPiece(length, section, P, mass, (y, z), q))
+        pieces = rod_pieces(segments, laws, manipulator.pressures(pressure), end_effects=end_effects)
         y, z = core_section(segments[-1]).mean(axis=1).tolist()
         return cls(pieces, np.eye(4) if base_pose is None else base_pose, (y, z))
 
@@ -162,6 +146,35 @@ class Rod:
         s, poses, wrench, error, iterations, load_steps = refine(self, vectors, tolerance, first_load)
         moment, force = wrench[:, :3], wrench[:, 3:]
         return RodState(Centreline(s, poses), force, moment, error, iterations, load_steps)
+
+
+def rod_pieces(
+    segments: Sequence[Segment],
+    laws: Sequence[SegmentLaw],
+    pressures: ArrayLike,
+    counts: Sequence[float] | np.ndarray | None = None,
+    end_effects: bool = True,
+) -> list[RodPiece]:
+    """The pieces, three of each, of n segments in a row with laws and pressures (MPa) of their own; counts
+    (n,): of chambers, real numbers, by default the segments' own; end_effects: as for Rod.of."""
+    pressures = np.broadcast_to(np.asarray(pressures, float), len(segments))
+    cells = cell_strains(laws, segments, pressures)
+    lengths, strains = free_pieces(segments, cells, counts, end_effects)
+    pieces: list[RodPiece] = []
+    known: dict[tuple[Segment, int, float], SectionLaw] = {}
+    for i, (length, q) in enumerate(zip(lengths.tolist(), strains.vector)):  # three of each segment
+        segment, P = segments[i // 3], float(pressures[i // 3])
+        turn = rotation(segment)
+        if i % 3 == 1 and segment.kind != PASSIVE:
+            mass, z = active_mass(segment)
+            section: SectionLaw = _turned(laws[i // 3].of(segment), segment)
+        else:
+            (mass, z), P, bend = passive_mass(segment), 0.0, float(turn[:, 2] @ q[3:])
+            alike = segment.key, segment.roll, bend
+            section = known.setdefault(alike, _turned(passive_law(segment, bend), segment))
+        y, z = (turn[1:, 2] * z).tolist()
+        pieces.append(RodPiece(length, section, P, mass, (y, z), q))
+    return pieces
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,6 +31,7 @@ REFUSED = {
     "nan": ({"bore": float("nan")}, "bore_mm = nan must be larger than 0"),
     "text": ({"bore": "1"}, "bore_mm = '1' must be a number"),
     "count": ({"turns": 0}, "turns = 0 must be at least 1"),
+    "half a count": ({"turns": 2.5}, "turns = 2.5 must be a whole number"),
     "percent": ({"lift": -0.1}, "lift_percent = -10 must be larger than 0: it opens upwards"),
     "choice": ({"kind": "cock"}, "kind = 'cock' is not known: write 'ball', 'needle' or 'gate'"),
     "no choice": ({"kind": None}, "kind = None is not known: write 'ball', 'needle' or 'gate'"),

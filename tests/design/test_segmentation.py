@@ -90,8 +90,8 @@ def test_gradient_agrees_with_differences(frames):
     random = np.random.default_rng(1)
     points, seen = observed(ROD, 150.0, noise=0.5, frames=frames)
     base = ROD.start[:3, :3] @ se3.exp_rotation(np.array([0.02, 0.01, -0.03]))
-    weights = random.uniform(0.5, 1.5, len(points))
-    data = Observations(points, 0.3, 150.0, frames=seen, base=base, weights=weights, shortest=37.0)
+    more = {"frames": seen, "base": base, "weights": random.uniform(0.5, 1.5, 150), "shortest": 37.0}
+    data = Observations(points, 0.3, np.linspace(0, 150, 150), **more)
     rod = PiecewiseRod(ROD.start, ROD.joints + 1.0, ROD.strains * 1.02)
     fit = RodFit(data, rod, np.ones((4, 2), bool), np.linspace(0, 150, len(points)))
 
@@ -116,8 +116,8 @@ def test_standard_errors_are_those_of_repeated_noise():
     off = []
     for seed in range(40):
         points, _ = observed(rod, 130.0, noise=0.3, count=80, seed=seed)
-        free = np.array([[False, True], [True, True]])
-        fit = refined(RodFit(Observations(points, 0.3, 130.0), rod, free, np.linspace(0, 130, 80)), 40, 1e-4)
+        free, s = np.array([[False, True], [True, True]]), np.linspace(0, 130, 80)
+        fit = refined(RodFit(Observations(points, 0.3, s), rod, free, s), 40, 1e-4)
         errors = np.sqrt(np.diag(fit.covariance))[-3:]
         off.append((fit.rod.strains[free] - rod.strains[free]) / errors)
     assert np.mean(np.array(off) ** 2) == pytest.approx(1.0, abs=0.35)  # 120 numbers, some correlated
@@ -245,8 +245,8 @@ def test_what_cannot_be_reached_is_given_up_and_that_is_said():
 
 
 def test_pieces_that_are_too_short_or_too_many_are_given_up():
-    corner = np.vstack([np.linspace([0, 0, 0], [60, 0, 0], 30), np.linspace([60, 2, 0], [60, 60, 0], 30)])
-    split = segment(Target(corner))
+    kink = PiecewiseRod(np.eye(4), np.array([50.0, 58.0]), np.array([[0.0, 0.0], [0.0, 0.15], [0.0, 0.0]]))
+    split = segment(target_of(kink, 108.0, noise=0.1, count=60))
     assert min(lengths(split)) > 19 and any("not followed" in note for note in split.notes)
     split = segment(target_of(MIXED, 200.0), options=SplitOptions(most_pieces=2))
     assert len(split.pieces) == 2 and any("most that are allowed" in note for note in split.notes)

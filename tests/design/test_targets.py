@@ -23,11 +23,19 @@ def toml(tmp_path, text):
 
 @pytest.mark.parametrize("name", sorted(make_targets.TARGETS))
 def test_shipped_targets_are_what_their_numbers_say(name, tmp_path):
-    make_targets.main(tmp_path)
+    make_targets.main(tmp_path, tmp_path, tmp_path / "curves")
     assert (tmp_path / f"{name}.csv").read_text() == (SHIPPED / f"{name}.csv").read_text()
     target = read_target(SHIPPED / f"{name}.toml")
     steps = np.linalg.norm(np.diff(target.points, axis=0), axis=1)
     assert len(target.points) == 201 and np.ptp(steps) < 4e-4  # even but for the fourth decimal
+
+
+def test_the_octopus_with_frames_is_what_its_numbers_say(tmp_path):
+    make_targets.main(tmp_path, tmp_path, tmp_path / "curves")
+    shipped = Path(make_targets.__file__).parent / "curves" / "octopus.csv"
+    assert (tmp_path / "curves" / "octopus.csv").read_text() == shipped.read_text()
+    target = read_target(shipped)
+    assert abs(target.points - read_target("octopus").points).max() < 1e-4 and len(target.frames) == 201
 
 
 def test_bare_columns_and_named_ones_say_the_same(tmp_path):

@@ -87,3 +87,26 @@ def test_a_script_is_no_mesh(tmp_path):
     path.write_text('SystemCall "touch obeyed";\n')
     with pytest.raises(InputError, match="not a mesh"):
         read_mesh(path)
+
+
+def test_tags_are_those_of_a_body():
+    """Of two segments, the second with a layer, and of two pressure groups."""
+    faces = list(tags.face_names(2))
+    good = {
+        "points": CORNERS,
+        "cells": np.array([[0, 1, 2, 3]] * 3),
+        "cell_tags": np.array([tags.BODY, tags.BODY + 1, tags.LAYER + 1]),
+        "facets": np.array([[0, 1, 2]] * len(faces)),
+        "facet_tags": np.array(faces),
+    }
+    VolumeMesh(**good).require_tags([False, True], 2)
+    for layered, groups, changes in (
+        ([True, True], 2, {}),
+        ([False], 2, {}),
+        ([False, True], 1, {}),
+        ([False, True], 3, {}),
+        ([False, True], 2, {"cell_tags": np.array([tags.BODY, tags.BODY + 1, tags.BODY + 1])}),
+        ([False, True], 2, {"facet_tags": np.array([*faces[:-1], tags.LAST_FACE])}),
+    ):
+        with pytest.raises(InputError, match="tags are not those of this body: make it again"):
+            VolumeMesh(**(good | changes)).require_tags(layered, groups)

@@ -5,6 +5,7 @@ import pytest
 
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry.cad.morph import moved
+from pneunet.geometry.grids.cell import cell_grid
 from pneunet.geometry.parameters import ONE_SIDED
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import DIRECTIONS, changed, direction_matrix, normal_pitch, shape_numbers
@@ -68,3 +69,10 @@ def test_directions_keep_the_normal_pitch_and_are_what_the_matrix_says(segment):
         other = changed(segment, change, 0.01)
         assert normal_pitch(other) == pytest.approx(normal_pitch(segment))
         assert shape_numbers(other) - shape_numbers(segment) == pytest.approx(0.01 * row, abs=1e-12)
+
+
+@pytest.mark.parametrize("segment", BODIES, ids=lambda s: s.kind)
+def test_the_grid_of_one_cell_goes_to_that_of_the_other(segment):
+    other = replace(segment, angle=segment.angle + 0.5, width=1.01 * segment.width, roof=1.02 * segment.roof)
+    grids = [cell_grid(s, 1.7).mesh(air=True).points for s in (segment, other)]
+    assert moved(grids[0], segment, other) == pytest.approx(grids[1], abs=1e-12)

@@ -1,14 +1,20 @@
 """The sample of a campaign and its prescribed strains; the command itself is in
 tests/pneunet/test_campaign.py."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import NeoHookean, material_to_table
+from pneunet.geometry.designfile import segment_table
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING
+from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import SHAPE, shape_numbers
-from pneunet.hifi.runs.campaign.case import first_touch, prescribed_change
+from pneunet.hifi.runs.campaign.case import first_touch, prescribed_change, solve_campaign_case
 from pneunet.hifi.runs.campaign.extension import taken_over
 from pneunet.hifi.runs.campaign.file import EDGES, on_offer, read_campaign
 from pneunet.hifi.runs.campaign.sample import RANGES, prescribed_states, segments
@@ -123,6 +129,22 @@ def test_shape_numbers_do_not_change_with_size():
     assert shape_numbers(a)[[SHAPE.index("cavity_thickness"), SHAPE.index("gap")]].sum() + 2 * shape_numbers(
         a
     )[SHAPE.index("wall")] == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("gap", "part"), [(1.0, True), (0.1, False)])
+def test_a_case_on_a_grid_takes_half_a_cell_until_walls_touch(gap, part, tmp_path):
+    segment = replace(CASES["one_sided_w10"](60.0, 1), gap=gap, material=NeoHookean(1.0))
+    inputs = {
+        "segment": segment_table(segment),
+        "material": material_to_table(segment.material),
+        "mesh": {"mesh_size_mm": 6.0, "element": "hexahedra"},
+        **{"levels": 2, "top_pressure": 0.05, "limit_share": 0.8, "prescribed": [], "slopes": False},
+    }
+    facts = solve_campaign_case(inputs, tmp_path)
+    last = json.loads((tmp_path / "states.json").read_text())[-1]
+    assert facts["mesh"]["part"] == part and (facts["first_touch"] is None) == part
+    assert last["pressure"] == pytest.approx(0.05) and last["unstable"] == 0
+    assert (last["contact_force"] > 0) != part
 
 
 def test_prescribed_strains_take_the_energy_they_are_told():

@@ -8,6 +8,7 @@ import pytest
 from mpi4py import MPI
 from scipy.integrate import simpson
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
@@ -25,6 +26,20 @@ from pneunet.hifi.path.stepping import StepSize, run_steps
 from pneunet.hifi.runs.cell import run_cell
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        ({"roll": 180}, "roll_deg = 180: a cell is one by itself"),
+        ({"group": 2}, "pressure_group = 2: a cell is one by itself"),
+        (None, "kind = 'passive': a cell is a pitch of chambers"),
+    ],
+)
+def test_what_is_of_a_body_is_refused_in_a_cell(other, message):
+    segment = CASES["one_sided_w10"](60.0, 1)
+    with pytest.raises(InputError, match=message):
+        CellCase(segment.plain(9.0) if other is None else replace(segment, **other), 0.01)
 
 
 def solved(segment, path, pressure, mesh_size=2.5):
@@ -173,7 +188,7 @@ def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
     it."""
     segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.208))
     states, limits = [], []
-    case = CellCase(segment, 0.05, 4.0, 8, control="volume", volume_factor=8.0)
+    case = CellCase(segment, 0.05, 6.0, 8, control="volume", volume_factor=8.0, contact="none")
     solve_cell(case, tmp_path / "cell.npz", states.append, limits.append)
     pressure, unstable = (np.array([getattr(s, name) for s in states]) for name in ("pressure", "unstable"))
     top = int(pressure.argmax())

@@ -21,7 +21,7 @@ from pneunet.hifi.path.stepping import StepSize, run_steps
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
 
-PRESSURE, SIZE = 0.010, 3.0
+PRESSURE, SIZE = 0.010, 4.0
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,13 @@ from mpi4py import MPI
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError
+from pneunet.base.files.atomic import read_columns
 from pneunet.geometry import Manipulator, Segment
 from pneunet.geometry.cad.mesh import mesh_manipulator
 from pneunet.geometry.meshfile import read_mesh
 from pneunet.geometry.sections import rotation
 from pneunet.hifi.body.manipulator import ManipulatorSolve
+from pneunet.hifi.runs.solve.tables import Tables
 from pneunet.hifi.verification import reference_case
 
 
@@ -160,8 +162,11 @@ def test_each_pressure_group_inflates_its_own_segments(shared_directory):
     solve.run(0.02, reached.append)
     P, V = np.array([(0.0, solve.rest_volume)] + [(m.pressure, m.volume) for m in reached]).T
     stored, pressures = solve.problem.stored_energy(), [float(p.value.value) for p in solve.pressures]
+    Tables(MPI.COMM_WORLD, shared_directory, solve.walls.gaps, (1.0, 0.5)).accepted(reached[-1])
     solve.destroy()
     assert pressures == pytest.approx([0.02, 0.01])
+    columns = ["pressure_kPa", "pressure_1_kPa", "pressure_2_kPa"]
+    assert read_columns(shared_directory / "steps.csv", columns)[-1] == pytest.approx([20, 20, 10])
     assert stored == pytest.approx(np.sum((P[1:] + P[:-1]) / 2 * np.diff(V)), rel=5e-3)
 
 

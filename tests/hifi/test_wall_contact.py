@@ -147,8 +147,8 @@ def pushed(tmp_path):
     x[-6:] = [0.97, 0.01, -0.015, 0.012, 0.003, -0.002]
     x[: problem.unknowns] = np.random.default_rng(4).normal(scale=2e-3, size=problem.unknowns)
     for gap in problem.walls.gaps:
-        for (facets, _), sign in zip(gap, (1, -1)):
-            nodes = np.unique(facets)
+        for wall, sign in zip(gap, (1, -1)):
+            nodes = np.unique(wall.facets)
             X = problem.nodes[nodes]
             towards = (
                 0.5 * segment.gap / segment.sin * (1.0 - 0.02 * (X[:, 1] / 7.5) ** 2 - 0.01 * abs(X[:, 2]))

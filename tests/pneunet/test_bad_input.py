@@ -85,7 +85,11 @@ TARGETS = {
         "pressure_kPa = 80\n[[piece]]",
         ["pressure_kPa = 80", "0..60 kPa"],
     ),
-    "unknown kind": ('"bending"', '"bent"', ["kind = 'bent'", "write 'twisting', 'bending' or 'helical'"]),
+    "unknown kind": (
+        '"bending"',
+        '"bent"',
+        ["kind = 'bent'", "write 'passive', 'twisting', 'bending' or 'helical'"],
+    ),
     "unit of a piece": (
         "length_mm",
         "length_m",
@@ -221,6 +225,9 @@ def test_design(folder, capsys, command, old, new, message):
         (["shape", "good.toml", "--pressure-kPa", "10,,20"], ["--pressure-kPa: '' is not a number"]),
         (["shape", "good.toml", "--pressure-kPa", "nan"], ["--pressure-kPa: 'nan' is not a number"]),
         (["shape", "good.toml", "--pressure-kPa=-5"], ["--pressure-kPa: -5 must lie in"]),
+        (["shape", "good.toml", "--pressure-kPa", "0"], ["0 must lie in 0..2000 kPa, 0 left out"]),
+        (["shape", ""], ["argument design: the name is empty"]),
+        (["shape", "good.toml", "-o", " "], ["argument -o/--output: the name is empty"]),
         (["solve", "good.toml", "--pressure-kPa", "10,20"], ["--pressure-kPa: one number"]),
         (["solve", "good.toml", "--pressure", "10"], ["unrecognized arguments: --pressure", "--help"]),
         (["mesh", "good.toml", "--mesh-size-mm", "0"], ["--mesh-size-mm: '0' must be a number in 0.1..20"]),

@@ -81,7 +81,7 @@ def test_every_command_has_its_help(command, tmp_path):
 
 def test_design_writes_what_it_found(folder):
     run = folder / "run 1"
-    names = {"design.toml", "target.csv", "centreline.csv", "design.png", "run.json"}
+    names = {"design.toml", "target.csv", "split.toml", "centreline.csv", "design.png", "run.json"}
     assert names <= {p.name for p in run.iterdir()}
     design = read_design_file(run / "design.toml")
     assert design.pressure == pytest.approx(0.040) and len(design.manipulator.segments) == 1

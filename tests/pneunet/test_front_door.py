@@ -12,9 +12,11 @@ import pytest
 import pneunet as pn
 from pneunet.base.files.results import Results
 from pneunet.geometry.parameters import Segment
+from pneunet.reduced import choose_law
 from tests.design.toy_law import ToyLaw
 
 ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples" / "designs"
 FINGER = pn.Manipulator((Segment("one-sided", 90.0, 8),))
 
 
@@ -94,6 +96,18 @@ def test_a_bare_number_is_no_pressure():
         predict(FINGER, 30, shipped_law())
 
 
+def test_what_is_none_is_refused(tmp_path):
+    turned_too_far = np.diag([2.0, 2, 2, 1])
+    for pose in (np.eye(3), np.full((4, 4), np.nan), turned_too_far, "here"):
+        with pytest.raises(pn.InputError, match=r"base_pose must be \(4, 4\): a rotation"):
+            pn.predict(FINGER, pressure_kPa=20, base_pose=pose)
+    for target in ("curve.csv", [["a", "b", "c"]] * 5, [[0, 0, 0], [1, 2]]):
+        with pytest.raises(pn.InputError, match="points must be rows of x, y, z in mm, not"):
+            pn.Target(target)
+    with pytest.raises(pn.InputError, match="ranks = 0 must be a whole number, at least 1"):
+        pn.Design.of(FINGER, pressure_kPa=20, law=ToyLaw()).solve(tmp_path, ranks=0)
+
+
 def test_a_law_asked_beyond_its_path_says_so(caplog):
     """It knows no strains there, and gives those at the path's end."""
     from pneunet.reduced import shipped_law
@@ -135,6 +149,34 @@ def test_a_manipulator_made_by_hand_goes_the_same_way(tmp_path):
     assert np.array_equal(design.predict(10).points, next(iter(design.predict(p for p in [10]))).points)
     assert design.errors is None and design.pressure_kPa == pytest.approx(20)
     assert pn.read_design(design.save(tmp_path / "a b")).manipulator == FINGER
+
+
+def test_a_number_is_the_largest_of_several_pressures():
+    bend = pn.segment(kind="one-sided", angle_deg=90, chambers=6)
+    below = pn.segment(kind="one-sided", angle_deg=90, chambers=6, roll_deg=180, pressure_group=2)
+    body = pn.Manipulator((bend.plain(15.0), bend, below))
+    arm = pn.Design.of(body, pressure_kPa=(30, 20))
+    lines = arm.predict([15, (30, 0)])
+    expected = [pn.predict(body, pressure_kPa=p).points for p in ([15, 10], [30, 0])]
+    assert all(np.array_equal(line.points, points) for line, points in zip(lines, expected))
+    assert arm.pressure_kPa == pytest.approx(30) and arm.strains.k[2, 1] < 0 < arm.strains.k[1, 1]
+    assert np.array_equal(pn.rod(body, pressure_kPa=[30, 0]).free().points, lines[1].points)
+    for wrong in ([30, 20, 10], [30, -1], [30, "x"]):
+        with pytest.raises(pn.InputError, match="pressure_kPa"):
+            pn.Design.of(body, pressure_kPa=wrong)
+    passive = pn.segment(kind="passive", plain_length_mm=15)
+    assert passive == pn.segment(kind="one-sided", angle_deg=60, chambers=1).plain(15.0)
+    for law in ("analytic", "trained"):
+        with pytest.raises(pn.InputError, match="kind = 'passive'"):
+            choose_law(law).strains(passive, 0.01)
+
+
+def test_the_example_of_an_s_ends_parallel_to_its_base_on_the_side_it_bends_to():
+    line = pn.read_design(EXAMPLES / "s_curve.toml").prediction
+    assert line.poses[-1, :3, :3] == pytest.approx(np.eye(3), abs=1e-9) and line.points[-1, 2] < -10
+    assert abs(line.points[:, 1]).max() < 1e-9
+    two = pn.read_design(EXAMPLES / "two_groups.toml")
+    assert two.content.pressure == (0.04, 0.025) and len(two.manipulator.groups) == 2
 
 
 def test_file_keys_are_arguments():

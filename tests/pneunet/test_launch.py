@@ -7,7 +7,9 @@ import time
 
 import pytest
 
+from pneunet.base.errors import InputError
 from pneunet.base.system import launch
+from pneunet.cli import COMMANDS
 
 RUN = [sys.executable, "-m", "pneunet", "run", "-n"]
 START = "import sys; from pneunet.base.system import launch; "
@@ -65,6 +67,13 @@ def test_without_dashes_it_is_a_subcommand_of_pneunet():
     line = launch.command_line(4, ["solve", "design.toml"])
     assert line[:3] == ["mpirun", "-n", "4"]
     assert line[3].endswith("/pneunet") and line[4:] == ["solve", "design.toml"]
+
+
+def test_what_knows_no_ranks_is_refused_on_several():
+    assert launch.command_line(1, ["mesh", "design.toml"])[4:] == ["mesh", "design.toml"]
+    with pytest.raises(InputError, match="run: pneunet mesh works on one rank: leave out run -n 2"):
+        launch.command_line(2, ["mesh", "design.toml"])
+    assert set(COMMANDS) - set(launch.SERIAL) == {"solve", "study", "campaign", "train", "workspace", "run"}
 
 
 def test_started_from_within_an_mpi_rank():

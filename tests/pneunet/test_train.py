@@ -21,7 +21,7 @@ def train(ranks, folder, name):
 
 
 def test_the_same_law_on_any_number_of_ranks(tmp_path):
-    write_dataset(tmp_path / "cells.npz", made_up_data())
+    write_dataset(tmp_path / "cells.npz", made_up_data(30))
     text = train(1, tmp_path, "one.npz")
     rows = ["calibrated analytic model", "law_interval_coverage_90"]
     rows += [f"{of}regressor of the states, by the pressure" for of in ("", "analytic model and ")]

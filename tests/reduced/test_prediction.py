@@ -24,6 +24,7 @@ from pneunet.reduced import (
 from pneunet.reduced.rod.areas import passive_mass
 from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import FreeSection
+from pneunet.reduced.rod.overlap import overlap_doubts
 from pneunet.reduced.rod.quadratic import passive_law
 
 TWISTING = Segment("twisting", 60.0, 4, cavity_floor=0.5)
@@ -155,8 +156,22 @@ def test_no_pressure_no_shape_change():
 
 
 def test_mirrored_manipulators_have_mirrored_centrelines():
-    one, other = (predict(arm, 0.03, AnalyticLaw()).points for arm in (ARM, ARM.mirrored))
-    np.testing.assert_allclose(other, one * [1, -1, 1], atol=1e-8)
+    narrow = {"width": 10.0, "channel_width": 2.0}
+    rolled = Manipulator([replace(s, roll=roll, **narrow) for s, roll in zip(ARM.segments, (0, 90, 180))])
+    for body in (ARM, rolled):
+        one, other = (predict(arm, 0.03, AnalyticLaw()).points for arm in (body, body.mirrored))
+        np.testing.assert_allclose(other, one * [1, -1, 1], atol=1e-8)
+
+
+def test_a_coil_runs_through_itself_however_it_is_rolled():
+    coil = replace(HELICAL, angle=88.0, chambers=90)
+    told = set()
+    for roll in (0, 90, 180, 270):
+        body = Manipulator((replace(coil, roll=roll),))
+        told.add(overlap_doubts(body, predict(body, 0.06, AnalyticLaw())))
+        higher = Manipulator((replace(coil, angle=50.0, roll=roll),))
+        assert overlap_doubts(higher, predict(higher, 0.02, AnalyticLaw())) == ()
+    assert len(told) == 1 and "runs through itself" in told.pop()[0]
 
 
 def test_any_law_with_strains_can_predict():

@@ -12,6 +12,7 @@ from pneunet.base.materials.laws import material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.system.processes import Limits
 from pneunet.geometry.designfile import segment_table
+from pneunet.geometry.meshfile import ELEMENTS
 from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.runs.campaign.sample import PLACES, RANGES, prescribed_states, segments
 from pneunet.hifi.runs.cases import Case, case_limits
@@ -45,8 +46,9 @@ KEYS = (*quantities(Numbers), "kinds", "further", "mesh", "ranges", "edge_ranges
 
 @dataclass(frozen=True)
 class Mesh(Checked):
-    """What geometry.cad.cell.mesh_cell is asked for; every: n-th designs, from the first, are computed on it,
-    and further ones where it is 1.
+    """What meshes of cells are like: gmsh's tetrahedra, of edge_size at the body's edges, or grids of
+    hexahedra, with a layer of edge_size at planes where stresses are singular. every: n-th designs, from the
+    first, are computed on it, and further ones where it is 1.
 
     prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free
     states of designs that are not held out are differentiated by the shape.
@@ -55,15 +57,17 @@ class Mesh(Checked):
     name: str = quantity(None)
     mesh_size: float = quantity("mm", low=0.02, high=20)
     edge_size: float | None = quantity("mm", None, low=0.02, high=20)
+    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
     every: int = quantity(None, 1, low=1, high=10_000)
     prescribed: int = quantity(None, 0, low=0, high=PLACES)
     prescribed_every: int = quantity(None, 1, low=1, high=10_000)
     slopes: bool = quantity(None, False)
 
     @property
-    def settings(self) -> dict[str, float]:
-        """Arguments of `mesh_cell` with their unit."""
-        return {key: value for key, value in to_table(self).items() if key.endswith("_mm")}
+    def settings(self) -> dict[str, Any]:
+        """What makes the mesh, in file units; tetrahedra are not mentioned."""
+        sizes = {key: value for key, value in to_table(self).items() if key.endswith("_mm")}
+        return sizes if self.element == "tetrahedra" else sizes | {"element": self.element}
 
     def prescribed_of(self, index: int) -> int:
         """How many prescribed states the design has."""

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from mpi4py import MPI
 
-from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.errors import ConvergenceError, InputError, located
 from pneunet.base.files.atomic import room_in
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.reading import read_json
@@ -94,7 +94,8 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     writer = FieldWriter(out, solve, goal) if fields else None
     log.info(
         f"solve: {mesh['cells']} cells, {solve.problem.dofs} dofs (Taylor-Hood), {comm.size}"
-        f" rank{'s' * (comm.size > 1)}, {goal.plan()}; set up in {time.perf_counter() - started:.1f} s"
+        f" rank{'s' * (comm.size > 1)}, {goal.plan()}{_proportions(design)}; set up in"
+        f" {time.perf_counter() - started:.1f} s"
     )
     before, last, complete = None, None, False
     if kept:
@@ -144,6 +145,12 @@ def _solve(design, directory, mesh_size, pressure, fields, comm, resume, milesto
     ending = goal.done(last, solve.stage, reached)
     log.info("; ".join([ending, *(point.text for point in last.limit_points), f"results in {out}"]))
     return last
+
+
+def _proportions(design):
+    """Of the pressures of several groups, to be read behind the plan."""
+    told = " : ".join(f"{share:.4g}" for share in design.shares)
+    return f" (pressure groups in the proportions {told})" * (len(design.shares) > 1)
 
 
 def _walk(solve, goal, told, record, milestones, before):
@@ -221,8 +228,11 @@ def _mesh(design, folder, mesh_size):
         "segments": segment_tables(design.manipulator),
     }
     if (folder / MESH).exists():
-        _, facts = read_mesh(folder / MESH)
+        mesh, facts = read_mesh(folder / MESH)
         if wanted == {name: facts.get(name) for name in wanted} and facts == _facts_for_people(folder):
+            body = design.manipulator
+            with located(folder / MESH):
+                mesh.require_tags([s.layer_thickness > 0 for s in body.segments], len(body.groups))
             return facts
     if folder.is_dir() and any(folder.glob("m*")):
         log.info(f"{folder}: no {MESH} of this body and mesh size with its mesh.json: meshed anew")

@@ -1,0 +1,132 @@
+"""Figures of grids: that every body has one, what cells on them are off by, and what they cost."""
+
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+KINDS = ("one_sided_w10", "twist_w12")
+PRESSURES = (0.02, 0.05)
+#: (largest element, layer beside planes with re-entrant edges), mm: a family of one shape at two sizes
+COARSER, FINER = (2.0, 0.5), (1.0, 0.25)
+#: MPa: a pressure under which a body's answer is linear
+SMALL = 1e-5
+#: of convergence at edges of 270 degrees: twice the exponent of their singularity
+ORDER = 2 * 0.5445
+
+
+def made():
+    """The part `grids`: ({key: value}, details)."""
+    from pneunet.base.errors import InputError
+    from pneunet.geometry.grids.body import body_grid
+    from pneunet.geometry.grids.cell import cell_grid
+    from pneunet.geometry.grids.sample import random_manipulator, random_segment
+    from pneunet.geometry.meshfile import open_edges
+
+    random = np.random.default_rng(22)
+    cells, bodies, failed = [], [], []
+    for draw, grid, count, seconds in (
+        (random_segment, lambda s: cell_grid(s, 2.0), 10_000, cells),
+        (random_manipulator, lambda m: body_grid(m, 2.0), 500, bodies),
+    ):
+        for _ in range(count):
+            body, started = draw(random), time.process_time()
+            try:
+                made = grid(body)
+                seconds.append(time.process_time() - started)
+                # which is refused unless it is positive at all corners and Gauss points
+                if open_edges(made.mesh().facets) and count == 500:
+                    raise InputError("its surface is open")
+            except InputError as error:
+                failed.append(f"{body}: {error}")
+    return {
+        "grids_made_of_10000": 10_000 - sum(text.startswith("Segment") for text in failed),
+        "grids_made_of_500_bodies": 500 - sum(text.startswith("Manipulator") for text in failed),
+        "grid_of_a_cell_ms": 1e3 * float(np.median(cells)),
+        "grid_of_a_body_ms": 1e3 * float(np.median(bodies)),
+    }, {"failed": failed}
+
+
+def sweep(segment, path, mesh):
+    """(CPU seconds, strains (2, 6) at PRESSURES, curvatures times the pitch) of 0 to 50 kPa in 5 levels, with
+    the stiffness at each. mesh: size of tetrahedra, or (size, layer) of a grid."""
+    from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.geometry.cad.grid import grid_cell
+    from pneunet.hifi.cell.file import CellCase
+    from pneunet.hifi.cell.problem import CellProblem
+    from pneunet.hifi.cell.run import follow_path
+
+    states, started = [], time.process_time()
+    if isinstance(mesh, float):
+        mesh_cell(segment, mesh, path)
+    else:
+        grid_cell(segment, mesh[0], path, mesh[1], part=True)
+    case = CellCase(segment, PRESSURES[-1], levels=5, contact="none")
+    follow_path(case, CellProblem(segment, path), states.append)
+    at = {round(s.pressure, 6): s for s in states}
+    strains = [[*at[p].strains.e, *(at[p].strains.k * segment.pitch)] for p in PRESSURES]
+    return time.process_time() - started, np.array(strains)
+
+
+def cells():
+    """The part `cell-grids`: ({key: value}, details)."""
+    from pneunet.geometry.reference_cases import CASES
+
+    meshes = {"tetrahedra": 2.0, "default": (1.5, None), "coarser": COARSER, "fine": FINER}
+    errors, ratios, rows = {mesh: [] for mesh in meshes}, [], []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cell.npz"
+        for name in KINDS:
+            segment = CASES[name](60.0, 1)
+            for mesh in (3.0, (3.0, None)):
+                sweep(segment, path, mesh)  # compiles the forms
+            runs = {mesh: sweep(segment, path, value) for mesh, value in meshes.items()}
+            fine, coarser = runs["fine"][1], runs["coarser"][1]
+            extrapolated = fine + (fine - coarser) / ((COARSER[0] / FINER[0]) ** ORDER - 1)
+            norm = np.linalg.norm(extrapolated - np.eye(6)[0], axis=1)
+            for mesh, (seconds, strains) in runs.items():
+                error = np.linalg.norm(strains - extrapolated, axis=1) / norm
+                errors[mesh].append(error.max())
+                rows.append({"case": name, "mesh": mesh, "cpu_seconds": seconds, "error_rel": error.tolist()})
+            ratios.append(runs["default"][0] / runs["tetrahedra"][0])
+    return {
+        "cell_grid_error_rel": float(max(errors["default"])),
+        "cell_fine_grid_error_rel": float(max(errors["fine"])),
+        "cell_tetrahedra_error_rel": float(max(errors["tetrahedra"])),
+        "cell_default_vs_tets_ratio": float(max(ratios)),
+        "cell_fine_cpu_seconds": float(max(r["cpu_seconds"] for r in rows if r["mesh"] == "fine")),
+        "cell_default_cpu_seconds": float(max(r["cpu_seconds"] for r in rows if r["mesh"] == "default")),
+    }, {"runs": rows}
+
+
+def bodies(sizes=(1.5, 0.75), tetrahedra=2.0):
+    """The part `body-grids`: ({key: value}, details): the tip of one-sided-w10, five chambers, at rest's
+    stiffness."""
+    from pneunet.geometry.cad.mesh import mesh_manipulator
+    from pneunet.geometry.meshfile import MESH
+    from pneunet.geometry.parameters import Manipulator
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.hifi.body.manipulator import ManipulatorSolve
+
+    body, tips, rows = Manipulator((CASES["one_sided_w10"](60.0, 5),)), [], []
+    meshes = [*((size, "hexahedra") for size in sizes), (tetrahedra, "tetrahedra")]
+    with tempfile.TemporaryDirectory() as folder:
+        for size, element in meshes:
+            mesh_manipulator(body, size, folder, element)
+            started = time.process_time()
+            solve = ManipulatorSolve(body, Path(folder) / MESH)
+            solve.run(SMALL, stability=False, first_step=SMALL)
+            tips.append((solve.measure().frames[-1, :3, 3] - [body.length, 0, 0]) / SMALL)
+            rows.append(
+                {
+                    "mesh_size_mm": size,
+                    "element": element,
+                    "dofs": solve.problem.dofs,
+                    "cpu_seconds": time.process_time() - started,
+                    "tip_mm_per_MPa": tips[-1].tolist(),
+                }
+            )
+            solve.destroy()
+    off = [float(np.linalg.norm(tip - tips[1]) / np.linalg.norm(tips[1])) for tip in tips]
+    return {"body_grid_tip_rel": off[0], "body_tetrahedra_tip_rel": off[2]}, {"runs": rows}

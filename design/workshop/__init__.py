@@ -1,0 +1,1 @@
+"""What the workshop gets: the sheet for casting a design, and the files of its moulds."""

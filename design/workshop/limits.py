@@ -1,0 +1,125 @@
+"""How far a casting may be inflated, and why: the walls touch, the silicone tears, or the shape gives way."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.units import MPA_PER_KPA
+from pneunet.design.report.rundata import Solution
+from pneunet.geometry.designfile import DesignFile
+from pneunet.geometry.parameters import Segment
+from pneunet.reduced.analytic.clearance import gap_left, wall_bulge
+from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.prediction import doubts, predict
+
+#: of the design's pressure: no limit is looked for beyond
+FARTHEST = 3.0
+#: of the strain at break: what walls may come to, since bubbles and bonds tear before
+SAFE = 0.5
+
+
+@dataclass(frozen=True)
+class Limit:
+    """pressure in MPa, the largest of the groups'; reason in words."""
+
+    pressure: float
+    reason: str
+
+
+def limits(design: DesignFile, law: SegmentLaw, solved: Solution | None = None) -> list[Limit]:
+    """What limits the pressure, the lowest first; finite elements know better than estimates where there are
+    any."""
+    found = [*_touch(design, solved), *_break(design, solved), *_limit_point(design, law, solved)]
+    return sorted(found, key=lambda limit: limit.pressure)
+
+
+def wall_stretch(segment: Segment, pressure: float) -> float:
+    """Estimated mean stretch of a chamber's wall at `pressure` (MPa): an arc over the wall's shorter side."""
+    half = min(segment.chamber_height, segment.cavity_width / segment.sin) / 2
+    angle = 2 * np.arctan(wall_bulge(segment, pressure) / half)
+    return float(angle / np.sin(angle)) if angle > 1e-9 else 1.0
+
+
+def _touch(design, solved):
+    told = None if solved is None else solved.record.get("first_touch_kPa")
+    if told is not None:
+        yield Limit(told * MPA_PER_KPA, "walls of neighbouring chambers touch (finite elements)")
+        return
+    pressure, i = _first(design, gap_left, solved)
+    if i is not None:
+        yield Limit(pressure, f"walls of segment {i} touch (estimate by plates, which is early by a quarter)")
+
+
+def _break(design, solved):
+    allowed = {
+        m: 1 + SAFE * m.elongation_at_break
+        for m in design.manipulator.materials
+        if np.isfinite(m.elongation_at_break)
+    }
+    if solved is not None and allowed:
+        steps, most = solved.steps, min(allowed.values())
+        over = np.flatnonzero(steps["largest_stretch"] > most)
+        if len(over):
+            pressure = steps["pressure_kPa"][over[0]] * MPA_PER_KPA
+            yield Limit(pressure, f"stretch {most:.2f}, half of the elongation at break (finite elements)")
+            return
+    pressure, i = _first(design, lambda s, p: allowed.get(s.material, np.inf) - wall_stretch(s, p), solved)
+    if i is not None:
+        most = allowed[design.manipulator.segments[i - 1].material]
+        yield Limit(
+            pressure,
+            f"walls of segment {i} come to stretch {most:.2f}, half of the elongation at break (estimate by"
+            " plates)",
+        )
+
+
+def _first(
+    design: DesignFile, left: Callable[[Segment, float], float], solved: Solution | None
+) -> tuple[float, int | None]:
+    """(lowest of the largest pressures, MPa, at which left(segment, its pressure) is 0; number of that
+    segment), (inf, None) where it is positive for all up to FARTHEST. Not below what was solved without
+    it."""
+    top = FARTHEST * design.largest_pressure
+    found: list[tuple[float, int | None]] = [(np.inf, None)]
+    for i, s in enumerate(design.manipulator.segments):
+
+        def of(p, s=s, i=i):
+            value = left(s, float(design.manipulator.pressures(design.scaled(p))[i]))
+            return min(value, 1e3)
+
+        if s.chambers and of(top) < 0:
+            found.append((float(brentq(of, 0.0, top, xtol=1e-6)), i + 1))
+    pressure, number = min(found, key=lambda each: each[0])
+    return max(pressure, solved.pressure if solved else 0.0), number
+
+
+def _limit_point(design, law, solved):
+    points = [] if solved is None else solved.record.get("limit_points", [])
+    if points:
+        reached = points[0]["pressure_kPa"] * MPA_PER_KPA
+        yield Limit(reached, "limit point: the pressure rises no further (finite elements)")
+        return
+
+    def objection(pressure):
+        try:
+            predict(design.manipulator, design.scaled(pressure), law)
+        except ConvergenceError:
+            return "limit point: the law finds no equilibrium beyond"
+        except InputError as error:
+            return str(error)
+        told = doubts(design.manipulator, [design.scaled(pressure)], law)
+        return f"the law vouches no further: {told[0]}" if told else None
+
+    low, high = 0.0, FARTHEST * design.largest_pressure
+    if not high or not objection(high):
+        return
+    reason = objection(high)
+    while high - low > 0.01 * design.largest_pressure:
+        middle = (low + high) / 2
+        told = objection(middle)
+        low, high, reason = (low, middle, told) if told else (middle, high, reason)
+    if low:
+        yield Limit(low, reason)
