@@ -57,6 +57,7 @@ SERIAL = (
     "fit-material",
     "doctor",
     "compare",
+    "view",
     "export",
 )
 

@@ -48,6 +48,8 @@ def run_view(
     """
     if film and film not in FILMS:
         raise InputError(f"film = '{film}': write {' or '.join(each[1:] for each in FILMS)}")
+    if film == ".mp4":
+        import imageio_ffmpeg  # noqa: F401  (that it is here is known before anything is written)
     if window and not has_display():
         raise InputError("--window: there is no display here: open view.html in a browser instead")
     found = read_design_folder(run)
