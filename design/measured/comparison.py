@@ -240,6 +240,8 @@ class MeasuredComparison:
         if f.wall_interval:
             told += f" (90 %: {f.wall_interval[0]:+.3f} to {f.wall_interval[1]:+.3f})"
         out.append(f"best fit: {told}; RMS {f.rms:.3g} {unit}")
+        if f.at_the_edge:
+            return [*out, "no modulus in reach fits: is it this body, in these units?"]
         out.append(
             f"so the shape designed for {c['design_pressure_kPa']:.4g} kPa needs"
             f" {c['pressure_for_the_shape_kPa']:.4g} kPa; at {c['design_pressure_kPa']:.4g} kPa the tip is"

@@ -168,6 +168,11 @@ def test_the_laws_bars_are_those_of_its_strains(tmp_path):
     assert found.inside is not None
 
 
+def test_another_body_or_unit_is_not_taken_for_a_modulus(tmp_path):
+    write_csv(tmp_path / "m.csv", ["p_kPa", "displacement_mm"], [[0, 0], [12, 0.01], [24, 0.02]])
+    assert "in these units?" in compare(design(), tmp_path / "m.csv").lines()[-1]
+
+
 def test_rows_of_a_ramp_become_levels_with_their_scatter(tmp_path):
     rng = np.random.default_rng(3)
     p = np.concatenate([np.full(50, -0.02), np.linspace(0.5, 30, 900)])

@@ -5,6 +5,7 @@ import pytest
 
 from pneunet.base import se3
 from pneunet.cli import main
+from pneunet.design.report import viewing
 from pneunet.design.report.loadsteps import load_steps
 from pneunet.design.report.report import write_report
 from pneunet.design.report.rundata import read_design_folder
@@ -67,6 +68,16 @@ def test_a_design_alone_is_shown_by_the_reduced_model(tmp_path):
     assert len(figure.frames) == len(figure.layout.sliders[0].steps) == len(steps.labels)
     few = steps.of_steps([0, 8])
     assert few.labels == ("0 kPa", "20 kPa") and page_bytes(few) < page_bytes(steps)
+
+
+def test_a_page_that_would_be_too_large_shows_fewer_steps(tmp_path, monkeypatch):
+    make_run(tmp_path / "run", segments=(PLANE,), solve=False)
+    run = read_design_folder(tmp_path / "run")
+    whole = load_steps(run, AnalyticLaw())
+    monkeypatch.setattr(viewing, "LARGEST_PAGE", (viewing.SCRIPT + page_bytes(whole)) / 2)
+    few = viewing._that_fit(run, AnalyticLaw())
+    assert page_bytes(few) <= 1.1 * viewing.LARGEST_PAGE and 2 <= len(few.labels) < len(whole.labels)
+    assert (few.labels[0], few.labels[-1]) == (whole.labels[0], whole.labels[-1])
 
 
 def test_the_page_is_in_the_report_and_bad_input_is_one_line(tmp_path, capsys):
