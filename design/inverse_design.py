@@ -2,6 +2,7 @@
 
 import logging
 import time
+from dataclasses import replace
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -56,8 +57,8 @@ def inverse_design(
             raise InputError(f"{name} = '{value}' is not known: write {' or '.join(known)}")
     law, target = chosen_law(law), as_target(target)
     log.info(f"target {target.name}: {len(target.points)} points; {target.base_told}")
-    asked = wanted(target, law)
-    target = asked.target
+    asked = wanted(replace(target, material=target.softest), law)
+    target = replace(asked.target, material=target.material)
     log.info(f"{asked.note}: {len(asked.pieces)} pieces, {target.length:.2f} mm")
     for i, piece in enumerate(asked.pieces, start=1):
         log.info(f"  piece {i}: {describe(piece)}")
@@ -65,6 +66,8 @@ def inverse_design(
         log.info(f"  {text}")
     found = search(target, asked.pieces, law, objective)
     best = found.best
+    chosen = best.manipulator.segments[0].material
+    target = replace(target, material=chosen)
     content = DesignFile(
         best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose, loads=target.loads
     )
@@ -82,6 +85,8 @@ def inverse_design(
             "notes": list(asked.notes),
             "objective": objective,
             "law": law.name,
+            "silicone": chosen.name,
+            "mu_MPa": round(chosen.mu, 6),
             "followed": design.followed,
             "doubts": list(design.doubts),
             "active_bounds": list(found.active),
@@ -104,6 +109,8 @@ def _table(candidate):
     segments = candidate.manipulator.segments
     return {
         "rms_mm": round(candidate.rms, 4),
+        "silicone": segments[0].material.name,
+        "mu_MPa": round(segments[0].material.mu, 6),
         "pressure_kPa": [round(KPA_PER_MPA * float(P), 3) for P in candidate.pressures],
         "segment": [to_table(s) for s in segments],
     }
@@ -206,6 +213,11 @@ def answer(design: Design) -> Iterator[str]:
             f" {spread.law_tip:.1f} mm (90 % of cases) for the law, {spread.mesh_tip:.1f} mm for the mesh of"
             " its cells, which is a little too stiff"
         )
-    if target.material is PAPER_TWISTING:
-        material = f"{target.material.name}, mu = {target.material.mu:g} MPa"
-        yield f"ASSUMED silicone: {material}; give yours as [material] in a target's TOML"
+    silicone, casting = f"{target.material.name}, mu = {target.material.mu:.4g} MPa", target.casting
+    if casting.silicones:
+        yield f"chosen of {len(casting.silicones)} silicones: {silicone}"
+    elif casting.moduli:
+        low, high = casting.moduli
+        yield f"chosen modulus: mu = {target.material.mu:.4g} MPa, of {low:g}..{high:g} MPa"
+    elif target.material is PAPER_TWISTING:
+        yield f"ASSUMED silicone: {silicone}; give yours as [material] in a target's TOML"

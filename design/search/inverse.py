@@ -13,6 +13,7 @@ import numpy as np
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.materials.laws import of_modulus
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.lookup import Guess, first_guesses
@@ -31,12 +32,15 @@ SPLIT_KEPT = 0.3  # a segment's number of chambers stays within this fraction of
 #: the second
 FINE_ENOUGH, GOOD_ENOUGH = 1e-4, 1e-3
 STARTS = 4
+#: moduli at which first guesses are made, of a range of them: one over the other
+MODULI_APART = 1.5
 #: alternatives: so many, at pressures (MPa) so far apart, with angles (deg) so different or other numbers
 ALTERNATIVES, APART, DISTINCT = 3, 0.008, 3.0
 #: RMS of an alternative over the design's at which it takes its place
 BETTER = 0.9
 #: name -> step beyond a bound that its cost is told of, in words; 0.1 mm of all others
 USUAL = {"angle": (1.0, "1 deg"), "pressure": (0.001, "1 kPa"), "chambers": (1.0, "1")}
+USUAL |= {"mu": (0.01, "0.01 MPa")}
 #: mm; bounds that cost less are named without
 WORTH_TELLING = 0.005
 log = logging.getLogger(__name__)
@@ -66,8 +70,10 @@ class Candidate:
         return f"angles {_angles(segments)} deg, chambers {counts}, {pressures} kPa, RMS {self.rms:.2f} mm"
 
     def differs(self, other: "Candidate") -> bool:
-        """Whether another one has other numbers of chambers or clearly other angles."""
+        """Whether another one has another silicone, other numbers of chambers or clearly other angles."""
         pairs = list(zip(self.manipulator.segments, other.manipulator.segments))
+        if any(a.material.name != b.material.name for a, b in pairs):
+            return True
         return any(a.chambers != b.chambers or abs(a.angle - b.angle) >= DISTINCT for a, b in pairs)
 
 
@@ -98,16 +104,48 @@ def search(
     """
     if objective not in OBJECTIVES:
         raise InputError(f"objective = '{objective}' is not known: write {' or '.join(OBJECTIVES)}")
-    prototypes = [prototype(target, piece) for piece in pieces]
-    guesses = _guesses(target, pieces, prototypes, law)
-    if not guesses:
+    tried, failed = [], None
+    for material in target.materials:
+        of_it = replace(target, material=_within(material, target.casting.moduli))
+        try:
+            one = _Search(of_it, tuple(pieces), law, objective, alternatives)
+        except ConvergenceError as error:
+            failed = error
+            continue
+        tried.append(one)
+        if len(target.materials) > 1:
+            log.info(f"silicone {material.name}: {one.best}")
+    if not tried:
+        assert failed is not None
+        raise failed
+    chosen = min(tried, key=lambda one: one.best.rms)
+    return chosen.found([one.best for one in tried if one is not chosen])
+
+
+def _within(material, moduli):
+    """The material with its modulus brought into (lowest, highest), if there is such a range."""
+    return material if moduli is None else of_modulus(material, float(np.clip(material.mu, *moduli)))
+
+
+def _guesses(target, pieces, law):
+    """Of every modulus that may be chosen, best first."""
+    materials = [target.material]
+    if target.casting.moduli is not None:
+        low, high = target.casting.moduli
+        moduli = np.geomspace(low, high, 1 + int(np.ceil(np.log(high / low) / np.log(MODULI_APART))))
+        materials = [of_modulus(target.material, mu) for mu in moduli.tolist()]
+    found = []
+    for material in materials:
+        of_it = replace(target, material=material)
+        found += _guesses_at(of_it, pieces, [prototype(of_it, piece) for piece in pieces], law)
+    if not found:
         raise ConvergenceError(
             "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
         )
-    return _Search(target, tuple(pieces), law, objective, alternatives).run(guesses)
+    return sorted(found, key=lambda guess: guess.misfit)
 
 
-def _guesses(target, pieces, prototypes, law):
+def _guesses_at(target, pieces, prototypes, law):
     angles, heights = [], []
     for i, (piece, segment) in enumerate(zip(pieces, prototypes)):
         if segment.kind != PASSIVE and piece.length < (least := shortest(segment)):
@@ -143,7 +181,7 @@ def _angles(segments):
 
 
 class _Search:
-    """The way from guesses to a Found; counts evaluations."""
+    """The way from guesses to the best body of one silicone, and on to a Found; counts evaluations."""
 
     def __init__(self, target, pieces, law, objective, most):
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
@@ -151,21 +189,24 @@ class _Search:
         self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
         self.most = most if objective == PAIRED and not self.loaded else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
-
-    def run(self, guesses):
-        problem, optimum = self._from_guesses(guesses)
+        self.guesses = _guesses(target, pieces, law)
+        problem, optimum = self._from_guesses(self.guesses)
         if self.objective == EQ27:
             aims = Aim.all_of(self.target, problem.body.segments[0].width, EQ27)
             problem, optimum = self._counted(optimised(replace(problem, aims=aims), self.floor))
         log.info(f"real-valued optimum: {_told(problem, optimum)}")
-        flush = self._flush_costs(problem, optimum)
-        whole = self._whole(problem, optimum)
-        log.info(f"whole chambers:      {_told(*whole)}")
-        best = self._cast(whole)
-        log.info(f"dimensions on grid:  {best}")
+        self.real, self.whole = (problem, optimum), self._whole(problem, optimum)
+        log.info(f"whole chambers:      {_told(*self.whole)}")
+        self.best = self._cast(self.whole)
+        log.info(f"dimensions on grid:  {self.best}")
+
+    def found(self, of_other_silicones):
+        """The Found, with the best Candidates of other silicones among the alternatives."""
+        best, whole = self.best, self.whole
+        flush = self._flush_costs(*self.real)
         bounds = sorted(_active(*whole), key=lambda pair: -pair[0])
         stopped = bounds[0][1] if bounds and bounds[0][0] > 0 else ""
-        alternatives = self._alternatives(best, whole, guesses)
+        alternatives = self._alternatives(best, whole, self.guesses, of_other_silicones)
         if alternatives and alternatives[0].rms < BETTER * best.rms:
             best, alternatives = alternatives[0], (best, *alternatives[1:])
         touching = () if self.target.casting.allow_touch else _touching(best)
@@ -221,7 +262,7 @@ class _Search:
         names = ["wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall"]
         names += ["cavity_thickness", "gap", "end_margin", "plain_length"]
         steps = dict.fromkeys(names, casting.grid or 0.001)
-        return {"angle": casting.angle_grid or 0.01} | steps
+        return {"angle": casting.angle_grid or 0.01, "mu": 0.001} | steps
 
     def _whole(self, problem, optimum, tried=TRIED):
         """With whole numbers of chambers."""
@@ -244,10 +285,13 @@ class _Search:
         rms = float(np.sqrt(at.misfit))
         return Candidate(Manipulator(segments), pressures, body.base_pose, rms, problem, at)
 
-    def _alternatives(self, best, whole, guesses):
+    def _alternatives(self, best, whole, guesses, of_other_silicones):
         """Distinct Candidates that are not much worse."""
-        found: list[Candidate] = []
         allowed = max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+        found = [c for c in of_other_silicones if c.rms <= allowed]
+        found = sorted(found, key=lambda c: c.rms)[: self.most]
+        if len(found) == self.most:
+            return tuple(found)
         for other in self._others(whole, guesses) if self.most else ():
             if np.sqrt(other[1].at.misfit) > allowed:
                 continue

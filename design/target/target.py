@@ -8,7 +8,7 @@ import numpy as np
 
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
-from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic
+from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, of_modulus, silicone
 from pneunet.base.quantities import Checked, quantity
 from pneunet.design.target.casting import Casting
 from pneunet.design.target.points import checked_frames, checked_points, checked_weights
@@ -110,6 +110,17 @@ class Target:
     def __repr__(self) -> str:
         told = f"{len(self.points)} points{' with frames' * (self.frames is not None)}, {self.length:.1f} mm"
         return f"<Target {self.name}: {told}{f', {len(self.pieces)} pieces' if self.pieces else ''}>"
+
+    @property
+    def materials(self) -> tuple[Hyperelastic, ...]:
+        """Those to choose among: the silicones that may be cast, else the target's own."""
+        return tuple(map(silicone, self.casting.silicones)) or (self.material,)
+
+    @property
+    def softest(self) -> Hyperelastic:
+        """What reaches farthest of all that may be chosen."""
+        material = min(self.materials, key=lambda m: m.mu)
+        return of_modulus(material, self.casting.moduli[0]) if self.casting.moduli else material
 
     @property
     def length(self) -> float:

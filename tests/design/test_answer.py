@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
 from pneunet.cli import NOT_FOLLOWED, main
 from pneunet.design.inverse_design import answer, inverse_design
 from pneunet.design.search.inverse import search
@@ -97,3 +98,29 @@ def test_an_answer_in_plain_words(tmp_path, capsys):
     last = list(answer(inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())))
     assert last[0].startswith("followed: RMS") and "law 'toy' does not know" in last[1]
     assert last[2].startswith("ASSUMED silicone: paper, twisting theory, mu = 0.317 MPa")
+
+
+def test_the_silicone_is_chosen_from_a_list_or_a_range():
+    soft, stiff = silicone("Dragon Skin 10 MEDIUM"), silicone("Dragon Skin 30")
+    line, pieces = made(tuple(replace(s, material=stiff) for s in PAIR), 0.05)
+    target = Target(line.points, pieces=pieces, pressure_range=(0.05, 0.05), **BASE)
+    listed = replace(target, casting=Casting(silicones=(soft.name, stiff.name)))
+    design = inverse_design(listed, law=ToyLaw())
+    assert {s.material for s in design.manipulator.segments} == {stiff}
+    assert design.content.result["silicone"] == stiff.name
+    assert list(answer(design))[2].startswith("chosen of 2 silicones: Dragon Skin 30, mu = ")
+    # dimensions fixed: the modulus alone makes up for the pressure
+    dimensions = {"base_thickness": 2.0, "chamber_height": 4.0}
+    body = tuple(replace(s, **dimensions, material=of_modulus(PAPER_TWISTING, 0.2)) for s in PAIR)
+    line, pieces = made(body, 0.03)
+    target = Target(line.points, pieces=pieces, pressure_range=(0.03, 0.03), vary={}, **BASE)
+    ranged = replace(target, casting=Casting(moduli=(0.1, 0.5)))
+    found = search(ranged, extract(ranged, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
+    assert [s.material.mu for s in found] == pytest.approx([0.2, 0.2], rel=0.02)
+
+
+def test_walls_are_within_what_is_cast():
+    line, pieces = made(PAIR)
+    target = Target(line.points, pieces=pieces, casting=Casting(walls=(1.4, 1.8)), **BASE)
+    for s in search(target, extract(target, pieces), ToyLaw(), alternatives=0).best.manipulator.segments:
+        assert all(1.4 <= wall <= 1.8 for wall in (s.wall, s.top_wall, s.side_wall, s.roof))
