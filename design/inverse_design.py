@@ -2,8 +2,8 @@
 
 import logging
 import time
-from dataclasses import replace
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from pneunet.base.materials.laws import PAPER_TWISTING
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.design import Design, chosen_law
+from pneunet.design.report.labels import kPa
 from pneunet.design.search.aims import OBJECTIVES, PAIRED
 from pneunet.design.search.doubts import WARN, WAYS, tell_doubts
 from pneunet.design.search.inverse import search
@@ -106,12 +107,12 @@ def inverse_design(
 
 def _table(candidate):
     """A Candidate in numbers, for result tables."""
-    segments = candidate.manipulator.segments
+    segments, one = candidate.manipulator.segments, candidate.pressures.shape[1] == 1
     return {
         "rms_mm": round(candidate.rms, 4),
         "silicone": segments[0].material.name,
         "mu_MPa": round(segments[0].material.mu, 6),
-        "pressure_kPa": [round(KPA_PER_MPA * float(P), 3) for P in candidate.pressures],
+        "pressure_kPa": (KPA_PER_MPA * candidate.pressures.squeeze(axis=1 if one else ())).round(3).tolist(),
         "segment": [to_table(s) for s in segments],
     }
 
@@ -171,14 +172,14 @@ def summary(design: Design) -> Iterator[str]:
             f"  {s.gap:6.2f} {s.length:7.1f}{rolled}"
         )
     length, seconds = f"undeformed length {design.manipulator.length:.1f} mm", design.effort["wall_seconds"]
-    yield f"pressure {design.pressure_kPa:.2f} kPa, {length}, {seconds:.1f} s"
+    yield f"pressure {kPa(design.content.pressure)}, {length}, {seconds:.1f} s"
     if design.errors:
         yield "errors of the reduced prediction:"
         yield from ("  " + text for text in design.errors.lines())
     shapes = design.target.shapes if design.target else ()
     for i, (shape, e) in enumerate(zip(shapes, design.further_errors), start=1):
         told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
-        yield f"shape {i} at {KPA_PER_MPA * shape.pressures[0]:.2f} kPa: {told}"
+        yield f"shape {i} at {kPa(shape.pressures)}: {told}"
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"

@@ -11,29 +11,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.materials.laws import of_modulus
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
-from pneunet.design.search.lookup import Guess, first_guesses
-from pneunet.design.search.problem import Body, Evaluation, Problem
-from pneunet.design.search.space import Variable, grid, limits, prototype, variables_of
+from pneunet.design.search.guesses import guesses, start
+from pneunet.design.search.problem import Evaluation, Problem
 from pneunet.design.search.whole import STEPS, TRIED, on_grid, optimised, with_whole_chambers
 from pneunet.design.target.extraction import Extracted
-from pneunet.design.target.target import PRESSURE_LIMIT, Target
+from pneunet.design.target.target import Target
 from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.laws import SegmentLaw
 
-LEAST_PRESSURE = 0.002  # MPa
-SPLIT_KEPT = 0.3  # a segment's number of chambers stays within this fraction of what its piece asks for
 #: of the curve's length: nothing better is looked for below the first; starts are tried until one is below
 #: the second
 FINE_ENOUGH, GOOD_ENOUGH = 1e-4, 1e-3
 STARTS = 4
-#: moduli at which first guesses are made, of a range of them: one over the other
-MODULI_APART = 1.5
 #: alternatives: so many, at pressures (MPa) so far apart, with angles (deg) so different or other numbers
 ALTERNATIVES, APART, DISTINCT = 3, 0.008, 3.0
 #: RMS of an alternative over the design's at which it takes its place
@@ -48,8 +42,8 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A body that can be cast: pressures (aims,) in MPa; base_pose (4, 4) in target coordinates; rms: root
-    mean square misfit, mm; problem, at: what it is the optimum of, and its Evaluation."""
+    """A body that can be cast: pressures (aims, groups of segments) in MPa; base_pose (4, 4) in target
+    coordinates; rms: root mean square misfit, mm; problem, at: what it is the optimum of, and its Evaluation."""
 
     manipulator: Manipulator
     pressures: np.ndarray
@@ -59,14 +53,15 @@ class Candidate:
     at: Evaluation
 
     @property
-    def pressure(self) -> float:
-        """Of the first shape, MPa."""
-        return float(self.pressures[0])
+    def pressure(self) -> float | tuple[float, ...]:
+        """Of the first shape, MPa; one for each group where there are several."""
+        own = tuple(self.pressures[0].tolist())
+        return own if len(own) > 1 else own[0]
 
     def __str__(self) -> str:
         segments = self.manipulator.segments
         counts = " / ".join(str(s.chambers) for s in segments)
-        pressures = ", ".join(f"{KPA_PER_MPA * P:.1f}" for P in self.pressures)
+        pressures = ", ".join(map(_kPa, self.pressures))
         return f"angles {_angles(segments)} deg, chambers {counts}, {pressures} kPa, RMS {self.rms:.2f} mm"
 
     def differs(self, other: "Candidate") -> bool:
@@ -127,53 +122,8 @@ def _within(material, moduli):
     return material if moduli is None else of_modulus(material, float(np.clip(material.mu, *moduli)))
 
 
-def _guesses(target, pieces, law):
-    """Of every modulus that may be chosen, best first."""
-    materials = [target.material]
-    if target.casting.moduli is not None:
-        low, high = target.casting.moduli
-        moduli = np.geomspace(low, high, 1 + int(np.ceil(np.log(high / low) / np.log(MODULI_APART))))
-        materials = [of_modulus(target.material, mu) for mu in moduli.tolist()]
-    found = []
-    for material in materials:
-        of_it = replace(target, material=material)
-        found += _guesses_at(of_it, pieces, [prototype(of_it, piece) for piece in pieces], law)
-    if not found:
-        raise ConvergenceError(
-            "the law has no equilibrium for these dimensions at any allowed pressure: make the walls thicker"
-        )
-    return sorted(found, key=lambda guess: guess.misfit)
-
-
-def _guesses_at(target, pieces, prototypes, law):
-    angles, heights = [], []
-    for i, (piece, segment) in enumerate(zip(pieces, prototypes)):
-        if segment.kind != PASSIVE and piece.length < (least := shortest(segment)):
-            found = f"length_mm = {piece.length:.3g}"
-            raise InputError(
-                f"[[piece]] {i + 1}: {found} is too short for one chamber and its ends ({least:.3g} mm)"
-            )
-        varying = limits(target, piece, segment)
-        angles.append(grid(varying.get("angle"), 90.0, 5.0))
-        heights.append(grid(varying.get("chamber_height"), segment.chamber_height, 1.0))
-    if len(target.pressures) > 1:
-        raise InputError("pressure_kPa: a design has one pressure for all segments: give one")
-    low, high = target.pressure_range or (0.010, PRESSURE_LIMIT)
-    if target.weights is not None and not target.weights.any():  # the curve is a guide to the last tip point
-        low = high = max([float(s.pressures[0]) for s in target.shapes] + _tip_pressures(target))
-    pressures = (
-        np.linspace(low, high, max(1, round((high - low) / 0.010)) + 1) if high > low else np.array([low])
-    )
-    return first_guesses(pieces, prototypes, angles, heights, pressures, law)
-
-
-def _tip_pressures(target):
-    return [] if target.tip is None else target.tip.pressures.tolist()
-
-
-def shortest(segment: Segment) -> float:
-    """Length (mm) of one chamber and its ends, at rest."""
-    return 2 * segment.end_length + segment.chamber_thickness
+def _kPa(pressures):
+    return " / ".join(f"{KPA_PER_MPA * P:.1f}" for P in pressures)
 
 
 def _angles(segments):
@@ -189,7 +139,7 @@ class _Search:
         self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
         self.most = most if objective == PAIRED and not self.loaded else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
-        self.guesses = _guesses(target, pieces, law)
+        self.guesses = guesses(target, pieces, law)
         problem, optimum = self._from_guesses(self.guesses)
         if self.objective == EQ27:
             aims = Aim.all_of(self.target, problem.body.segments[0].width, EQ27)
@@ -277,13 +227,13 @@ class _Search:
         problem, optimum = on_grid(whole, self._grid(), self.floor)
         self.evaluations += optimum.evaluations
         body = problem.body
-        pressures = body.pressures[:, 0].round(6)
-        body = replace(body, pressures=np.broadcast_to(pressures[:, None], body.pressures.shape))
+        body = replace(body, pressures=body.pressures.round(6))
         problem = replace(problem, body=body, everything=True)
         at = problem.evaluate(problem.x) or optimum.at
         segments = tuple(replace(s, chambers=round(n)) for s, n in zip(body.segments, body.counts))
-        rms = float(np.sqrt(at.misfit))
-        return Candidate(Manipulator(segments), pressures, body.base_pose, rms, problem, at)
+        rms, whole = float(np.sqrt(at.misfit)), Manipulator(segments)
+        pressures = body.pressures[:, [group[0] for group in whole.groups]]
+        return Candidate(whole, pressures, body.base_pose, rms, problem, at)
 
     def _alternatives(self, best, whole, guesses, of_other_silicones):
         """Distinct Candidates that are not much worse."""
@@ -305,11 +255,12 @@ class _Search:
     def _others(self, whole, guesses):
         """With whole chambers: from the other local optima, at other pressures, with one chamber more or
         less."""
-        chosen = whole[0].body.pressures[0, 0]
+        chosen = whole[0].body.pressures[0].max()
         seen = [chosen]
         for problem, optimum in sorted(self.optima, key=lambda found: found[1].cost):
-            if min(abs(problem.body.pressures[0, 0] - P) for P in seen) >= APART:
-                seen.append(problem.body.pressures[0, 0])
+            own = problem.body.pressures[0].max()
+            if min(abs(own - P) for P in seen) >= APART:
+                seen.append(own)
                 yield self._whole(problem, optimum, tried=1)
         apart = [g for g in guesses[:ALTERNATIVES] if min(abs(g.pressure - P) for P in seen) >= APART]
         for guess in apart:
@@ -335,66 +286,12 @@ def _held_near(problem, pressure):
     return replace(problem, variables=tuple(variables))
 
 
-def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess: Guess) -> Problem:
-    """The Problem at an entry of the lookup table, with the base turned to the target."""
-    segments, n = guess.segments, len(pieces)
-    variables = variables_of(target, pieces, segments, not target.casting.allow_steps)
-    aims = Aim.all_of(target, segments[0].width)
-    pressures = np.array([guess.pressure if aim.pressure is None else aim.pressure for aim in aims])
-    if aims[0].pressure is None:
-        low, high = target.pressure_range or (LEAST_PRESSURE, PRESSURE_LIMIT)
-        if high > low:
-            scale = high - low if target.pressure_range else 0.02
-            variables.append(Variable("pressure", tuple(range(n)), low, high, scale))
-    for i, count in enumerate(guess.counts):
-        if segments[i].kind == PASSIVE:
-            continue
-        low, high = np.floor(max(1.0, (1 - SPLIT_KEPT) * count)), np.ceil((1 + SPLIT_KEPT) * count + 1)
-        variables.append(Variable("chambers", (i,), low, high, 0.3 * count + 1, count))
-    turns = np.eye(3)[:, : 3 if target.base_direction is None else 1 if target.base_width is None else 0]
-    body = Body(
-        segments,
-        np.array(guess.counts),
-        np.tile(pressures[:, None], (1, n)),
-        _some_rotation(target),
-        target.points[0],
-    )
-    # flush undersides, and values within their ranges
-    values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
-    body = body.changed(variables, values)
-    gravity = np.array(target.gravity)
-    touch = target.casting.allow_touch
-    return _turned_to_target(
-        Problem(aims, pieces, law, tuple(variables), body, turns, gravity, may_touch=touch)
-    )
-
-
-def _turned_to_target(problem):
-    """The base turned about its free axes to bring the present curve nearest to the target, in closed
-    form."""
-    free, body = problem.turns.shape[1], problem.body
-    at = problem.evaluate(problem.x)
-    if at is None or not free:
-        return problem
-    aim, placed = problem.aims[0], at.shapes[0].placed
-    points, wanted = ((a - body.origin) @ body.rotation for a in (placed.points, aim.points))
-    moment = points.T @ wanted
-    if free == 1:
-        turn = se3.exp_rotation(
-            np.array([np.arctan2(moment[1, 2] - moment[2, 1], moment[1, 1] + moment[2, 2]), 0, 0])
-        )
-    else:
-        U, _, Vt = np.linalg.svd(moment)
-        turn = Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
-    return replace(problem, body=replace(body, rotation=body.rotation @ turn))
-
-
 def _told(problem, optimum):
     body = problem.body
     counts = " / ".join(f"{n:.3g}" for n in body.counts)
     return (
         f"angles {_angles(body.segments)} deg, chambers {counts},"
-        f" {KPA_PER_MPA * body.pressures[0, 0]:.1f} kPa,"
+        f" {_kPa(list(dict.fromkeys(body.pressures[0].tolist())))} kPa,"
         f" {np.sqrt(optimum.at.misfit):.3f} mm (root mean square)"
     )
 
@@ -415,28 +312,17 @@ def _active(problem, optimum):
 
 
 def _touching(candidate):
-    return about_to_touch(candidate.manipulator.segments, float(candidate.pressures.max()))
+    return about_to_touch(candidate.manipulator.segments, candidate.at.body.pressures.max(axis=0))
 
 
-def about_to_touch(segments: Sequence[Segment], pressure: float) -> Iterator[str]:
+def about_to_touch(segments: Sequence[Segment], pressures: Sequence[float]) -> Iterator[str]:
     """Segments whose estimated clearance the design has used up, in words."""
-    for i, segment in enumerate(segments, start=1):
+    for i, (segment, pressure) in enumerate(zip(segments, pressures), start=1):
         if segment.kind == PASSIVE:
             continue
-        left = gap_left(segment, pressure)
+        left = gap_left(segment, float(pressure))
         if left < 0.02 * segment.gap:
             yield (
                 f"segment {i} clearance of facing walls (estimate: {max(left, 0.0):.2f} mm left of"
                 f" {segment.gap:.2f} mm)"
             )
-
-
-def _some_rotation(target):
-    """The base's rotation where it is fixed, else any one with the fixed direction, else the identity."""
-    if target.base_rotation is not None:
-        return target.base_rotation
-    if target.base_direction is None:
-        return np.eye(3)
-    aside = np.cross(np.eye(3)[np.argmin(abs(target.base_direction))], target.base_direction)
-    aside /= np.linalg.norm(aside)
-    return np.column_stack([target.base_direction, aside, np.cross(target.base_direction, aside)])

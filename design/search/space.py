@@ -50,7 +50,7 @@ UNITS = {
 class Variable:
     """A design variable of some segments: its field (reduced.rod.piece_slopes.FIELDS), range, what counts as
     a large change, and the value it is drawn to where the target does not decide; of a pressure, the aims
-    that it is meant for."""
+    that it is meant for, and the number of its group of segments where there are several."""
 
     name: str
     segments: tuple[int, ...]
@@ -59,10 +59,13 @@ class Variable:
     scale: float
     start: float | None = None
     aims: tuple[int, ...] = (0,)
+    group: int = 0
 
     @property
     def title(self) -> str:
         """As users read it; of several segments at once, without their numbers."""
+        if self.group:
+            return f"{self.name} of group {self.group}"
         alone = len(self.segments) == 1 and self.name not in ("pressure", "mu")
         return f"segment {self.segments[0] + 1} {self.name}" if alone else self.name
 
@@ -90,7 +93,7 @@ def prototype(target: Target, piece: Extracted) -> Segment:
         segment = Segment(
             of_chambers, 90.0, 1, **(_start(of_chambers, target) | target.start), material=target.material
         )
-        segment = replace(segment, roll=round(piece.roll))
+        segment = replace(segment, roll=round(piece.roll), group=piece.group)
         return segment.plain(piece.length) if kind == PASSIVE else segment
     except InputError as error:
         raise InputError(f"[segment] (start dimensions of the {kind} segments): {error}") from None

@@ -82,8 +82,12 @@ def tolerances(body: Body, shape: Shape, casting: Casting, law: SegmentLaw) -> T
             elif moves.any():
                 add(f"{name}_mm", i + 1, "0.1 mm", moves, PER_LENGTH, casting.tolerance)
     by_pressure = shape.moves[:, :, :, FIELD_AT["pressure"]]
-    moves = by_pressure.sum(axis=2)
-    add("pressure_kPa", None, "1 kPa", moves, PER_PRESSURE * MPA_PER_KPA, casting.pressure_tolerance)
+    groups = sorted({segment.group for segment in body.segments})
+    for group in groups:
+        members = [i for i, segment in enumerate(body.segments) if segment.group == group]
+        moves = by_pressure[:, :, members].sum(axis=2)
+        name = "pressure_kPa" if len(groups) == 1 else f"pressure_{group}_kPa"
+        add(name, None, "1 kPa", moves, PER_PRESSURE * MPA_PER_KPA, casting.pressure_tolerance)
     # strains depend on the pressure over the modulus
     moves = -by_pressure @ body.pressures[0]
     add("mu_MPa", None, "1 %", moves, PER_MODULUS, casting.modulus_tolerance)

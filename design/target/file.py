@@ -29,7 +29,7 @@ from pneunet.design.target.target import (
     Target,
 )
 from pneunet.design.target.wrapfile import wrapped
-from pneunet.geometry.parameters import TWISTING, Segment
+from pneunet.geometry.parameters import MOST_GROUPS, TWISTING, Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
@@ -297,12 +297,13 @@ def _range(value, key, where):
 
 
 PIECE_KEYS = {
-    PASSIVE: ("kind", "length_mm"),
-    TWISTING: ("kind", "length_mm", "tau_rad_per_mm"),
-    BENDING: ("kind", "length_mm", "roll_deg", "curvature_per_m"),
+    PASSIVE: ("kind", "length_mm", "pressure_group"),
+    TWISTING: ("kind", "length_mm", "pressure_group", "tau_rad_per_mm"),
+    BENDING: ("kind", "length_mm", "pressure_group", "roll_deg", "curvature_per_m"),
     HELICAL: (
         "kind",
         "length_mm",
+        "pressure_group",
         "roll_deg",
         "cylinder_curvature_per_m",
         "pitch_mm",
@@ -331,13 +332,14 @@ class _Given(Checked):
     cylinder_curvature: float | None = quantity("per_m", None, above=0, low=1e-6, high=2e3)
     pitch: float | None = quantity("mm", None, low=-1e5, high=1e5)
     roll: float = quantity("deg", 0.0, low=0, high=270)
+    group: int = quantity(None, 1, key="pressure_group", low=1, high=MOST_GROUPS)
 
 
 def _piece(row, where):
     given = from_table(_Given, row, where)
     refuse_unknown(row, PIECE_KEYS[given.kind], where)
     curvature, twist = (given.curvature, given.twist) if given.kind != HELICAL else _helix(given, where)
-    return Piece(given.kind, given.length, twist, curvature, given.roll)
+    return Piece(given.kind, given.length, twist, curvature, given.roll, given.group)
 
 
 def _helix(given, where):

@@ -29,6 +29,7 @@ class Piece:
     length in mm; twist in rad/mm: the twist tau of a twisting piece, the torsion of a helical one; curvature
     in 1/mm (Frenet's). None = to be extracted from the points. roll in degrees: by how much the piece is
     turned about the axis against the section frame that runs through all pieces; 180 bends to the other side.
+    group: number of the group of segments that share its pressure.
     """
 
     kind: str
@@ -36,6 +37,7 @@ class Piece:
     twist: float | None = None
     curvature: float | None = None
     roll: float = 0.0
+    group: int = 1
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
 from pneunet.cli import NOT_FOLLOWED, main
 from pneunet.design.inverse_design import answer, inverse_design
@@ -124,3 +125,24 @@ def test_walls_are_within_what_is_cast():
     target = Target(line.points, pieces=pieces, casting=Casting(walls=(1.4, 1.8)), **BASE)
     for s in search(target, extract(target, pieces), ToyLaw(), alternatives=0).best.manipulator.segments:
         assert all(1.4 <= wall <= 1.8 for wall in (s.wall, s.top_wall, s.side_wall, s.roof))
+
+
+def test_each_group_of_segments_has_a_pressure_of_its_own(tmp_path):
+    body = (PAIR[0], replace(PAIR[1], chamber_height=4.0, base_thickness=2.4, group=2))
+    line, pieces = made(body, (0.045, 0.02))
+    pieces = (pieces[0], replace(pieces[1], group=2))
+    low = predict(Manipulator(body), (0.02, 0.03), ToyLaw(), 0.5)
+    # the dimensions are known: only pressures make up for it
+    target = Target(line.points, pieces=pieces, vary={}, start={"base_thickness": 2.4}, **BASE)
+    target = replace(target, shapes=(TargetShape(low.points, (0.02, 0.03)),))
+    free = inverse_design(target, law=ToyLaw())
+    assert free.content.pressure == pytest.approx((0.045, 0.02), rel=0.01)
+    fixed = inverse_design(replace(target, pressures=(0.045, 0.02)), law=ToyLaw())
+    for design in (free, fixed):
+        assert design.errors.rms < 0.3 and design.further_errors[0].rms < 0.3
+    assert fixed.content.pressure == (0.045, 0.02)
+    assert [e.name for e in free.tolerances.effects][-3:] == ["pressure_1_kPa", "pressure_2_kPa", "mu_MPa"]
+    folder = free.save(tmp_path / "out")
+    assert [p.group for p in Target.read(folder / "split.toml").pieces] == [1, 2]
+    with pytest.raises(InputError, match="pressure_kPa: several pressures need as many groups"):
+        inverse_design(Target(line.points, pieces=made(PAIR)[1], pressures=(0.03, 0.02)), law=ToyLaw())
