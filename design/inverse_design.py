@@ -1,8 +1,9 @@
 """Inverse design: from what is wanted to what to cast, and at what pressure."""
 
 import logging
+import textwrap
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,6 +37,10 @@ RATES = {
     "cylinder_curvature_per_m": ("cylinder curvature", "1/m"),
     "pitch_mm": ("pitch", "mm"),
 }
+#: of a terminal
+COLUMNS = 100
+#: dimensions that are named as those that move the shape most
+MOST = 4
 log = logging.getLogger(__name__)
 
 
@@ -60,11 +65,11 @@ def inverse_design(
     log.info(f"target {target.name}: {len(target.points)} points; {target.base_told}")
     asked = wanted(replace(target, material=target.softest), law)
     target = replace(asked.target, material=target.material)
-    log.info(f"{asked.note}: {len(asked.pieces)} pieces, {target.length:.2f} mm")
-    for i, piece in enumerate(asked.pieces, start=1):
-        log.info(f"  piece {i}: {describe(piece)}")
-    for text in asked.notes:
-        log.info(f"  {text}")
+    count = len(asked.pieces)
+    told = [f"{asked.note}: {count} piece{'s' * (count > 1)}, {target.length:.2f} mm"]
+    told += [f"  piece {i}: {describe(piece)}" for i, piece in enumerate(asked.pieces, start=1)]
+    for text in wrapped((*told, *(f"  {note}" for note in asked.notes))):
+        log.info(text)
     found = search(target, asked.pieces, law, objective)
     best = found.best
     chosen = best.manipulator.segments[0].material
@@ -91,6 +96,7 @@ def inverse_design(
             "followed": design.followed,
             "doubts": list(design.doubts),
             "active_bounds": list(found.active),
+            "pressure_limits": list(_pressure_limits(content, law)),
             "flush_underside_costs_mm": round(found.flush_costs, 4),
             "target_error": design.errors.table() if design.errors else {},
             "shape_error": [e.table() for e in design.further_errors],
@@ -109,7 +115,8 @@ def _table(candidate):
     """A Candidate in numbers, for result tables."""
     segments, one = candidate.manipulator.segments, candidate.pressures.shape[1] == 1
     return {
-        "rms_mm": round(candidate.rms, 4),
+        "rms_mm": round(candidate.centreline_rms, 4),
+        "misfit_mm": round(candidate.rms, 4),
         "silicone": segments[0].material.name,
         "mu_MPa": round(segments[0].material.mu, 6),
         "pressure_kPa": (KPA_PER_MPA * candidate.pressures.squeeze(axis=1 if one else ())).round(3).tolist(),
@@ -136,7 +143,7 @@ def run_design(
     with output_folder(directory) as folder:
         design = inverse_design(wanted, law=law, objective=objective, outside=outside)
         design.write(folder)
-    for text in (*summary(design), *answer(design)):
+    for text in wrapped((*summary(design), *answer(design))):
         log.info(text)
     return design
 
@@ -180,17 +187,44 @@ def summary(design: Design) -> Iterator[str]:
     for i, (shape, e) in enumerate(zip(shapes, design.further_errors), start=1):
         told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
         yield f"shape {i} at {kPa(shape.pressures)}: {told}"
-    yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
+    yield from _listed("active bounds", design.active_bounds or ["none"])
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"
     if design.tolerances:
-        yield "what moves it most: " + "; ".join(
-            f"{'segment ' + str(e.segment) + ' ' if e.segment else ''}{e.name.rsplit('_', 1)[0]}"
-            f" {e.change}: {e.rms:.2f} mm RMS, {e.tip:.2f} mm at the tip"
-            for e in largest(design.tolerances.effects, 4)
+        yield from _listed("what moves it most", map(str, largest(design.tolerances.effects, MOST)))
+    yield from _listed("alternatives", (f"{i}: {c}" for i, c in enumerate(design.alternatives, start=1)))
+    yield from _listed("limits of the pressure", design.content.result.get("pressure_limits", ()))
+
+
+def _listed(heading: str, rows: Iterable[str]) -> Iterator[str]:
+    """The heading, then a row a line; nothing without rows."""
+    for i, row in enumerate(rows):
+        if i == 0:
+            yield f"{heading}:"
+        yield f"  {row}"
+
+
+def _pressure_limits(content, law):
+    """A text each, lowest first."""
+    from pneunet.design.workshop.limits import limits
+
+    for limit in limits(content, law):
+        exceeded = " (EXCEEDED)" * (limit.pressure < content.largest_pressure)
+        yield f"{kPa(limit.pressure)}{exceeded}: {limit.reason}"
+
+
+def wrapped(lines: Iterable[str], width: int = COLUMNS) -> Iterator[str]:
+    """Lines no wider than a terminal; what goes on is indented further."""
+    for text in lines:
+        indent = " " * (len(text) - len(text.lstrip()))
+        yield from textwrap.wrap(
+            text,
+            width,
+            subsequent_indent=indent + "    ",
+            drop_whitespace=True,
+            break_long_words=False,
+            break_on_hyphens=False,
         )
-    for i, candidate in enumerate(design.alternatives, start=1):
-        yield f"alternative {i}: {candidate}"
 
 
 def answer(design: Design) -> Iterator[str]:

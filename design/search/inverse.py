@@ -43,7 +43,8 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A body that can be cast: pressures (aims, groups of segments) in MPa; base_pose (4, 4) in target
-    coordinates; rms: root mean square misfit, mm; problem, at: what it is the optimum of, and its Evaluation."""
+    coordinates; rms: of the misfit, mm: what is minimised, frames and further shapes in it; problem, at: what
+    it is the optimum of, and its Evaluation."""
 
     manipulator: Manipulator
     pressures: np.ndarray
@@ -62,7 +63,14 @@ class Candidate:
         segments = self.manipulator.segments
         counts = " / ".join(str(s.chambers) for s in segments)
         pressures = ", ".join(map(_kPa, self.pressures))
-        return f"angles {_angles(segments)} deg, chambers {counts}, {pressures} kPa, RMS {self.rms:.2f} mm"
+        told = f"angles {_angles(segments)} deg, chambers {counts}, {pressures} kPa"
+        return f"{told}, RMS {self.centreline_rms:.2f} mm"
+
+    @property
+    def centreline_rms(self) -> float:
+        """Of the points that the first shape is to meet, mm: no frames and no other shapes in it."""
+        away = self.at.shapes[0].placed.points - self.problem.aims[0].points
+        return float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
 
     def differs(self, other: "Candidate") -> bool:
         """Whether another one has another silicone, other numbers of chambers or clearly other angles."""
@@ -292,7 +300,7 @@ def _told(problem, optimum):
     return (
         f"angles {_angles(body.segments)} deg, chambers {counts},"
         f" {_kPa(list(dict.fromkeys(body.pressures[0].tolist())))} kPa,"
-        f" {np.sqrt(optimum.at.misfit):.3f} mm (root mean square)"
+        f" misfit {np.sqrt(optimum.at.misfit):.3f} mm"
     )
 
 

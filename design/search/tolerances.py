@@ -34,6 +34,11 @@ class Effect:
     rms: float
     tip: float
 
+    def __str__(self) -> str:
+        where = "" if self.segment is None else f"segment {self.segment} "
+        what = self.name.rsplit("_", 1)[0]
+        return f"{where}{what} {self.change}: {self.rms:.2f} mm RMS, {self.tip:.2f} mm at the tip"
+
 
 @dataclass(frozen=True)
 class Tolerances:

@@ -8,7 +8,7 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
 from pneunet.cli import NOT_FOLLOWED, main
-from pneunet.design.inverse_design import answer, inverse_design
+from pneunet.design.inverse_design import answer, inverse_design, summary, wrapped
 from pneunet.design.search.inverse import search
 from pneunet.design.target.casting import Casting
 from pneunet.design.target.extraction import extract
@@ -96,7 +96,11 @@ def test_an_answer_in_plain_words(tmp_path, capsys):
     assert "NOT followed: " in capsys.readouterr().out
     assert not result["followed"] and result["tolerances"]["casting_rms_mm"] > 0
     line, pieces = made(PAIR)
-    last = list(answer(inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())))
+    design = inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())
+    lines = list(wrapped((*summary(design), *answer(design))))
+    assert max(map(len, lines)) <= 100
+    assert lines[lines.index("what moves it most:") + 1].startswith("  segment ")
+    last = list(answer(design))
     assert last[0].startswith("followed: RMS") and "law 'toy' does not know" in last[1]
     assert last[2].startswith("ASSUMED silicone: paper, twisting theory, mu = 0.317 MPa")
 
@@ -118,6 +122,16 @@ def test_the_silicone_is_chosen_from_a_list_or_a_range():
     ranged = replace(target, casting=Casting(moduli=(0.1, 0.5)))
     found = search(ranged, extract(ranged, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
     assert [s.material.mu for s in found] == pytest.approx([0.2, 0.2], rel=0.02)
+
+
+def test_a_limit_below_the_pressure_is_said():
+    weak = replace(PAPER_TWISTING, elongation_at_break=0.001)
+    line, pieces = made(PAIR, 0.05)
+    target = Target(line.points, pieces=pieces, material=weak, pressure_range=(0.05, 0.05), **BASE)
+    told = inverse_design(target, law=ToyLaw(limit=0.06)).content.result["pressure_limits"]
+    assert "(EXCEEDED): walls of segment " in told[0] and "elongation at break" in told[0]
+    gives_way = next(text for text in told if text.endswith("the law finds no equilibrium beyond"))
+    assert float(gives_way.split()[0]) == pytest.approx(60, abs=0.6)
 
 
 def test_walls_are_within_what_is_cast():
