@@ -20,7 +20,7 @@ from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.labels import kPa
 from pneunet.design.search.aims import OBJECTIVES, PAIRED
 from pneunet.design.search.doubts import WARN, WAYS, tell_doubts
-from pneunet.design.search.inverse import search
+from pneunet.design.search.inverse import Map, search
 from pneunet.design.search.tolerances import largest, tolerances
 from pneunet.design.search.wanted import wanted
 from pneunet.design.target.extraction import Extracted, rates
@@ -50,12 +50,14 @@ def inverse_design(
     law: str | SegmentLaw = "trained",
     objective: str = PAIRED,
     outside: str = WARN,
+    mapping: Map = map,
 ) -> Design:
     """The Design whose predicted centreline lies on the target; writes and prints nothing.
 
     target: a Target, its file, or points (n, 3) in mm. law: 'trained', 'analytic', a law's file (.npz) or a
     SegmentLaw. objective: 'paired' or 'eq27' (docs/use-design.md). outside: 'warn' or 'refuse' a design that
-    the law doubts. InputError on bad input, ConvergenceError where the law has no answer.
+    the law doubts. mapping: a `map` that spreads the starts, over processes for instance; the answer does not
+    depend on it. InputError on bad input, ConvergenceError where the law has no answer.
     """
     started = time.perf_counter()
     for name, value, known in (("objective", objective, OBJECTIVES), ("outside", outside, WAYS)):
@@ -70,7 +72,7 @@ def inverse_design(
     told += [f"  piece {i}: {describe(piece)}" for i, piece in enumerate(asked.pieces, start=1)]
     for text in wrapped((*told, *(f"  {note}" for note in asked.notes))):
         log.info(text)
-    found = search(target, asked.pieces, law, objective)
+    found = search(target, asked.pieces, law, objective, mapping=mapping)
     best = found.best
     chosen = best.manipulator.segments[0].material
     target = replace(target, material=chosen)
@@ -132,7 +134,12 @@ def as_target(target: Target | str | Path | np.ndarray) -> Target:
 
 
 def run_design(
-    target: str | Path, directory: str | Path, law: SegmentLaw, objective: str = PAIRED, outside: str = WARN
+    target: str | Path,
+    directory: str | Path,
+    law: SegmentLaw,
+    objective: str = PAIRED,
+    outside: str = WARN,
+    mapping: Map = map,
 ) -> Design:
     """`pneunet design`: the inverse design of a target's file, saved in a folder, with its table on the
     screen.
@@ -141,7 +148,7 @@ def run_design(
     """
     wanted = Target.read(target)
     with output_folder(directory) as folder:
-        design = inverse_design(wanted, law=law, objective=objective, outside=outside)
+        design = inverse_design(wanted, law=law, objective=objective, outside=outside, mapping=mapping)
         design.write(folder)
     for text in wrapped((*summary(design), *answer(design))):
         log.info(text)
@@ -254,5 +261,5 @@ def answer(design: Design) -> Iterator[str]:
     elif casting.moduli:
         low, high = casting.moduli
         yield f"chosen modulus: mu = {target.material.mu:.4g} MPa, of {low:g}..{high:g} MPa"
-    elif target.material is PAPER_TWISTING:
+    elif target.material == PAPER_TWISTING:
         yield f"ASSUMED silicone: {silicone}; give yours as [material] in a target's TOML"

@@ -6,8 +6,9 @@ whole ones, then with dimensions on the grid that they are cast on.
 """
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
 from pneunet.reduced.analytic.clearance import gap_left
 from pneunet.reduced.rod.laws import SegmentLaw
 
+Map = Callable[..., Iterable]
 #: of the curve's length: nothing better is looked for below the first; starts are tried until one is below
 #: the second
 FINE_ENOUGH, GOOD_ENOUGH = 1e-4, 1e-3
@@ -100,8 +102,11 @@ def search(
     law: SegmentLaw,
     objective: str = PAIRED,
     alternatives: int = ALTERNATIVES,
+    mapping: Map = map,
 ) -> Found:
     """The `Found` for a Target split into `pieces` (`Extracted`), with so many alternatives at most.
+
+    mapping: a `map` that spreads the starts, over processes for instance; the answer does not depend on it.
 
     InputError where the pieces cannot be built, ConvergenceError where the law has no answer at any pressure.
     """
@@ -111,7 +116,7 @@ def search(
     for material in target.materials:
         of_it = replace(target, material=_within(material, target.casting.moduli))
         try:
-            one = _Search(of_it, tuple(pieces), law, objective, alternatives)
+            one = _Search(of_it, tuple(pieces), law, objective, alternatives, mapping)
         except ConvergenceError as error:
             failed = error
             continue
@@ -141,7 +146,8 @@ def _angles(segments):
 class _Search:
     """The way from guesses to the best body of one silicone, and on to a Found; counts evaluations."""
 
-    def __init__(self, target, pieces, law, objective, most):
+    def __init__(self, target, pieces, law, objective, most, mapping):
+        self.mapping = mapping
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
         self.optima = []
         self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
@@ -184,8 +190,10 @@ class _Search:
             f"lookup table: first guess at {KPA_PER_MPA * guesses[0].pressure:.1f} kPa, angles "
             + _angles(guesses[0].segments)
         )
-        for guess in guesses[:STARTS]:
-            self._try(start(self.target, self.pieces, self.law, guess))
+        work = partial(_from_guess, self.target, self.pieces, self.law, self.floor)
+        best = None
+        for found in self.mapping(work, guesses[:STARTS]):
+            self._keep(found)
             best = min(self.optima, key=lambda found: found[1].cost, default=None)
             if best and best[1].cost < (GOOD_ENOUGH * self.target.length) ** 2:
                 break
@@ -196,7 +204,9 @@ class _Search:
 
     def _try(self, problem, steps=30):
         """Its local optimum to the others'."""
-        found = optimised(problem, self.floor, steps)
+        return self._keep(optimised(problem, self.floor, steps))
+
+    def _keep(self, found):
         if found is not None:
             self.evaluations += found[1].evaluations
             self.optima.append(found)
@@ -282,6 +292,10 @@ class _Search:
             counts[longest] = max(1, counts[longest] + change)
             if found := self._try(replace(whole[0], body=replace(body, counts=counts))):
                 yield found
+
+
+def _from_guess(target, pieces, law, floor, guess):
+    return optimised(start(target, pieces, law, guess), floor)
 
 
 def _held_near(problem, pressure):
