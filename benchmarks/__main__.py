@@ -106,6 +106,7 @@ PARTS = {
         compare.compare,
         "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
     ),
+    "view": (compare.view, "size of the page of `pneunet view` of the demo, after make demo; some seconds"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "design": (
         design.design,

@@ -27,6 +27,7 @@ from pneunet.design.report.drawing import draw_drawing, segment_table
 from pneunet.design.report.labels import kPa, plain, segment_name, signed, significant
 from pneunet.design.report.page import STYLE, folded, grid, image, missing, table
 from pneunet.design.report.rundata import read_design_folder
+from pneunet.design.report.viewing import framed
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.laws import SegmentLaw
 
@@ -58,7 +59,7 @@ def _write(run, law, folder):
     body = _headline(run, comparison)
     for title, content in (
         ("Target, prediction, finite elements", lambda: _shapes(run, comparison, scene, folder)),
-        ("To turn by hand", lambda: _turned(run)),
+        ("To turn by hand", lambda: framed(run.directory)),
         ("Errors", lambda: _errors(comparison, run)),
         ("Strains of the segments", lambda: _strains(run, comparison)),
         ("Load history", lambda: _history(run, law, folder)),
@@ -147,17 +148,6 @@ def _shapes(run, comparison, scene, folder):
         + grid(folder, beside)
         + "".join(image(folder, *c) for c in curves)
         + grid(folder, fields)
-    )
-
-
-def _turned(run):
-    """The page of `pneunet view` in a frame, where the folder holds one."""
-    if not (run.directory / "view.html").exists():
-        return missing("To turn the body in a browser: pneunet view, on the folder of this page")
-    return (
-        '<p><a href="view.html">On a page of its own</a>, which lies beside this one.</p><iframe'
-        ' src="view.html" title="the body, to turn" loading="lazy"'
-        ' style="width:100%;height:820px;border:1px solid #e4e8ec"></iframe>'
     )
 
 

@@ -28,6 +28,7 @@ NUMBER = 4 * 4 / 3
 LINE, PLAIN = "#111111", segment_colour(0)
 FILM_PIXELS, FILM_SECONDS = (720, 576), 4.0
 FILMS = (".gif", ".mp4")
+PAGE = "view.html"
 
 
 def run_view(
@@ -46,6 +47,8 @@ def run_view(
     """
     if film and film not in FILMS:
         raise InputError(f"film = '{film}': write {' or '.join(each[1:] for each in FILMS)}")
+    if film == ".mp4":
+        import imageio_ffmpeg  # noqa: F401  (that it is here is known before anything is written)
     if window and not has_display():
         raise InputError("--window: there is no display here: open view.html in a browser instead")
     found = read_design_folder(run)
@@ -57,7 +60,7 @@ def run_view(
     if not steps.solved:
         log.info("no finite element fields in this folder: the reduced model's body is shown")
     with output_folder(directory or run) as folder:
-        path = folder / "view.html"
+        path = folder / PAGE
         write_text(path, page(steps))
         log.info(f"{len(steps.labels)} steps, {path.stat().st_size / 1e6:.1f} MB: {path}")
         if film:
@@ -66,6 +69,17 @@ def run_view(
     if window:
         show_window(steps)
     return path
+
+
+def framed(directory: Path) -> str:
+    """HTML that shows the page in a frame of another one in the same folder, or says how to make it."""
+    if not (directory / PAGE).exists():
+        return '<p class="missing">To turn the body in a browser: pneunet view, with the folder of this page.</p>'
+    return (
+        f'<p><a href="{PAGE}">On a page of its own</a>, which lies beside this one.</p><iframe src="{PAGE}"'
+        ' title="the body, to turn" loading="lazy" style="width:100%;height:820px;border:1px solid #e4e8ec">'
+        "</iframe>"
+    )
 
 
 def has_display() -> bool:
@@ -181,12 +195,12 @@ def _controls(figure, steps, keys, last):
             }
             for key in keys
         ]
-        menus.append(row | {"x": 0.0, "y": 1.07, "buttons": colours})
+        menus.append(row | {"x": 0.0, "y": 1.1, "buttons": colours})
     everything = np.vstack([*steps.points, *([] if steps.target is None else [steps.target])])
     low, high = everything.min(axis=0), everything.max(axis=0)
     margin = 0.03 * (high - low).max()
     low, high = low - margin, high + margin
-    size = (high - low) / (high - low).max()
+    size = 1.5 * (high - low) / np.linalg.norm(high - low)
     elevation, azimuth = np.radians(camera_angles(steps.points[-1]))
     eye = 1.5 * np.array(
         [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
@@ -200,12 +214,12 @@ def _controls(figure, steps, keys, last):
         scene=axes
         | {
             "aspectmode": "manual",
-            "aspectratio": dict(zip("xyz", map(float, 1.6 * size))),
+            "aspectratio": dict(zip("xyz", map(float, size))),
             "camera": {"eye": dict(zip("xyz", map(float, eye)))},
         },
         sliders=[slider],
         updatemenus=menus,
-        legend={"x": 0.0, "y": 0.9},
+        legend={"x": 0.0, "y": 0.0},
         margin={"l": 0, "r": 0, "t": 140, "b": 10},
         height=760,
     )

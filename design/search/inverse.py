@@ -168,7 +168,7 @@ class _Search:
         alternatives = self._alternatives(best, whole, guesses)
         if alternatives and alternatives[0].rms < BETTER * best.rms:
             best, alternatives = alternatives[0], (best, *alternatives[1:])
-        touching = about_to_touch(best.manipulator.segments, float(best.pressures.max()))
+        touching = () if self.target.casting.allow_touch else _touching(best)
         return Found(
             best, alternatives, (*(text for _, text in bounds), *touching), stopped, flush, self.evaluations
         )
@@ -319,7 +319,10 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
     body = body.changed(variables, values)
     gravity = np.array(target.gravity)
-    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns, gravity))
+    touch = target.casting.allow_touch
+    return _turned_to_target(
+        Problem(aims, pieces, law, tuple(variables), body, turns, gravity, may_touch=touch)
+    )
 
 
 def _turned_to_target(problem):
@@ -365,6 +368,10 @@ def _active(problem, optimum):
         saved = np.sqrt(at.misfit) - np.sqrt(max(at.misfit - max(outwards, 0.0) * step, 0.0))
         worth = f"; {told} beyond would save {saved:.2g} mm" if saved >= WORTH_TELLING else ""
         yield float(saved) * (saved >= WORTH_TELLING), variable.text(value) + worth
+
+
+def _touching(candidate):
+    return about_to_touch(candidate.manipulator.segments, float(candidate.pressures.max()))
 
 
 def about_to_touch(segments: Sequence[Segment], pressure: float) -> Iterator[str]:

@@ -15,6 +15,7 @@ from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import read_design_file
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced import predict
+from pneunet.reduced.analytic.clearance import gap_left
 from tests.design.test_inverse import BASE, made
 from tests.design.toy_law import ToyLaw
 
@@ -38,6 +39,17 @@ def test_dimensions_land_on_the_grid_with_a_flush_underside():
     assert a.base_thickness != b.base_thickness
     assert len(found.alternatives) and all(c.differs(found.best) for c in found.alternatives)
     assert all(c.rms >= 0.9 * found.best.rms for c in found.alternatives)
+
+
+def test_walls_and_touching_are_the_casters_to_allow():
+    line, pieces = made(PAIR, 0.05)
+    target = Target(line.points, pieces=pieces, pressure_range=(0.05, 0.05), **BASE)
+    target = replace(target, casting=Casting(walls=(0.6, 0.7), allow_touch=False))
+    kept = search(target, extract(target, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
+    assert all(0.6 <= s.wall <= 0.7 and gap_left(s, 0.05) > -0.05 for s in kept)
+    allowed = replace(target, casting=Casting(walls=(0.6, 0.7), allow_touch=True))
+    touching = search(allowed, extract(allowed, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
+    assert any(gap_left(s, 0.05) < -0.05 for s in touching)
 
 
 def test_one_body_meets_two_shapes_at_their_pressures():
