@@ -53,7 +53,7 @@ PARTS = {
     ),
     "ranks": (chain.ranks, "largest relative difference between the reference case on 1 and on 2 ranks"),
     "resume": (chain.resume, "a run killed with SIGKILL and resumed on 2 ranks against a whole one"),
-    "kills": (kills.kills, "60 runs killed with SIGKILL at random moments and run again; some 10 minutes"),
+    "kills": (kills.kills, "60 runs killed with SIGKILL at random moments and run again; some 6 minutes"),
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
     "door": (
@@ -106,6 +106,7 @@ PARTS = {
         compare.compare,
         "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
     ),
+    "view": (compare.view, "size of the page of `pneunet view` of the demo, after make demo; some seconds"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "design": (
         design.design,

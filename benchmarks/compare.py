@@ -1,4 +1,10 @@
-"""Public measurements beside what is computed (examples/measured): the part `compare`."""
+"""Public measurements beside what is computed (examples/measured), and the page to turn the demo: the parts
+`compare` and `view`."""
+
+import tempfile
+from pathlib import Path
+
+DEMO = Path(__file__).resolve().parents[1] / "out" / "demo"
 
 
 def compare():
@@ -19,3 +25,11 @@ def compare():
     }
     details |= {"measured_mm": list(beam.MEASURED.values()), "arm_arc_lengths_mm": arm.arc_lengths().tolist()}
     return figures, details
+
+
+def view():
+    """The page of the demo's folder, which `make demo` makes."""
+    from pneunet.design.report.viewing import run_view
+
+    with tempfile.TemporaryDirectory() as folder:
+        return {"view_html_MB": run_view(DEMO, folder).stat().st_size / 1e6}

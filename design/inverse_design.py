@@ -168,9 +168,10 @@ def summary(design: Design) -> Iterator[str]:
     if design.errors:
         yield "errors of the reduced prediction:"
         yield from ("  " + text for text in design.errors.lines())
-    for i, e in enumerate(design.further_errors, start=1):
+    shapes = design.target.shapes if design.target else ()
+    for i, (shape, e) in enumerate(zip(shapes, design.further_errors), start=1):
         told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
-        yield f"shape {i} at {KPA_PER_MPA * design.target.shapes[i - 1].pressures[0]:.2f} kPa: {told}"
+        yield f"shape {i} at {KPA_PER_MPA * shape.pressures[0]:.2f} kPa: {told}"
     yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"
@@ -196,7 +197,7 @@ def answer(design: Design) -> Iterator[str]:
         of_its_own = "no bound stops it: few pieces of constant strain do not follow this curve"
         stopped = design.stopped_by or of_its_own
         yield f"NOT followed: {100 * errors.not_followed:.0f} % of length; {rms}; {stopped}"
-    if spread.law_rms is None:
+    if spread.law_rms is None or spread.law_tip is None:
         yield f"how far the real body may be: the law '{design.law.name}' does not know"
     else:
         rms, tip = np.hypot(spread.law_rms, spread.mesh_rms), np.hypot(spread.law_tip, spread.mesh_tip)

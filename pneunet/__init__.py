@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from pneunet.front import report as report
     from pneunet.front import rod as rod
     from pneunet.front import segment as segment
+    from pneunet.front import view as view
     from pneunet.geometry.loading import DeadLoads as DeadLoads
     from pneunet.geometry.moulds.parameters import Moulds as Moulds
     from pneunet.geometry.parameters import Manipulator as Manipulator
@@ -87,6 +88,7 @@ _PLACES = {
     "segment": "front",
     "silicone": "base.materials.laws",
     "solve_cell": "design.chain",
+    "view": "front",
     "workspace": "design.workspace",
 }
 __all__ = [*_PLACES, "__version__"]

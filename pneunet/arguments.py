@@ -221,6 +221,13 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("directory", type=path)
     add_law(a, None)
 
+    a = add("view", "a page to turn the body in any browser, with a slider over load steps; a window, a film")
+    a("run", type=path, metavar="RUN", help="a design's folder")
+    a("--film", choices=("gif", "mp4"), help="of the inflation, as well")
+    a("--window", action="store_true", help="open a window as well, where there is a display")
+    add_law(a, None)
+    add_output(a, "the design's folder, where the report finds the page")
+
     a = add(
         "compare", "a measurement over pressure beside its prediction, and the modulus that it speaks for"
     )

@@ -51,14 +51,21 @@ def mesh(a: Namespace) -> None:
 def export(a: Namespace) -> None:
     from pneunet.front import read_design
 
-    read_design(a.design).export(a.output or a.design.parent, a.moulds)
+    folder = a.design if a.design.is_dir() else a.design.parent
+    read_design(a.design).export(a.output or folder, a.moulds)
+
+
+def _load_finite_elements(command):
+    import petsc4py  # noqa: F401  # where it is missing, one line says what to install, and nothing else is said
+
+    log.info(f"{command}; finite elements are being loaded")
 
 
 def solve(a: Namespace) -> None:
     from pneunet.geometry.designfile import read_design_file
 
     content = read_design_file(a.design)  # before finite elements are loaded, which takes a while
-    log.info(f"solve: {content.name}; finite elements are loaded")
+    _load_finite_elements(f"solve: {content.name}")
     from pneunet.hifi.runs.solve.solve import solve_design
 
     pressure = None if a.pressure is None else a.pressure * MPA_PER_KPA
@@ -67,21 +74,21 @@ def solve(a: Namespace) -> None:
 
 
 def cell(a: Namespace) -> None:
-    log.info(f"cell: {a.cell}; finite elements are loaded")
+    _load_finite_elements(f"cell: {a.cell}")
     from pneunet.hifi.runs.cell import run_cell
 
     run_cell(a.cell, a.output or a.cell.parent)
 
 
 def study(a: Namespace) -> None:
-    log.info(f"study: {a.study}; finite elements are loaded")
+    _load_finite_elements(f"study: {a.study}")
     from pneunet.hifi.runs.study.study import run_study
 
     run_study(a.study, a.output or Path("out") / a.study.stem, retry=a.retry)
 
 
 def campaign(a: Namespace) -> None:
-    log.info(f"campaign: {a.campaign}; finite elements are loaded")
+    _load_finite_elements(f"campaign: {a.campaign}")
     from pneunet.hifi.runs.campaign.campaign import run_campaign
 
     run_campaign(a.campaign, a.output or Path("out") / a.campaign.stem, retry=a.retry, extend=a.extend)
@@ -117,6 +124,12 @@ def report(a: Namespace) -> None:
     from pneunet.front import report as write
 
     write(a.directory, a.law)
+
+
+def view(a: Namespace) -> None:
+    from pneunet.design.report.viewing import run_view
+
+    run_view(a.run, a.output, a.law, a.film and f".{a.film}", a.window)
 
 
 def compare(a: Namespace) -> None:
@@ -156,6 +169,7 @@ COMMANDS = {
     "suggest": suggest,
     "train": train,
     "report": report,
+    "view": view,
     "compare": compare,
     "fit-material": fit_material,
     "run": run,

@@ -12,6 +12,7 @@ from pneunet.base.materials.laws import Hyperelastic, material_from_table
 from pneunet.base.units import each_in_MPa
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.report import write_report
+from pneunet.design.report.viewing import run_view
 from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.geometry.loading import DeadLoads
@@ -100,3 +101,10 @@ def report(directory: str | Path, law: str | SegmentLaw | None = None) -> Path:
     """Write one HTML page of what a design's folder holds; its path. law: by default that of the design.
     InputError where the folder holds no design."""
     return write_report(directory, None if law is None else chosen_law(law))
+
+
+def view(directory: str | Path, film: str | None = None, window: bool = False) -> Path:
+    """Write view.html of a design's folder: the body to turn in any browser, with a slider over load steps;
+    its path. film: 'gif' or 'mp4' of the inflation as well; window: open one, where there is a display.
+    InputError where the folder holds no design, or for another film."""
+    return run_view(directory, film=film and f".{film}", window=window)

@@ -7,7 +7,6 @@ installed here.
 import csv
 import importlib.util
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -22,29 +21,12 @@ import pytest
 from tests.test_architecture import NUMPY_AND_SCIPY_ALONE, PACKAGES, ROOT
 
 OFFLINE = ["--no-deps", "--no-index", "--disable-pip-version-check", "-q"]
-#: 25 mm of an arc of curvature 20 1/m, of which nearly everything is given: quickly designed
-ARC = """pressure_kPa = 40.0
-points_mm = [[0, 0, 0], [5, 0, -0.25], [10, 0, -1], [15, 0, -2.25], [20, 0, -4], [24, 0, -5.8]]
-[material]
-mu_MPa = 0.2
-[vary]
-angle_deg = [88, 92]
-[segment]
-width_mm = 8
-channel_width_mm = 2
-[[piece]]
-kind = "bending"
-length_mm = 24.737
-"""
-#: a shipped target to design instead; takes a minute more
-SHIPPED = os.environ.get("PNEUNET_WHEEL_TARGET")
 DESIGN_AND_SHAPE = """import sys
 from pathlib import Path
 from pneunet import design
 from pneunet.cli import main
-shipped = Path(design.__path__[0]) / "data" / f"{sys.argv[1]}.toml"
-target = str(shipped) if shipped.exists() else sys.argv[1]
-assert main(["design", target, "-o", "out"]) == 0
+shipped = Path(design.__path__[0]) / "data" / "octopus.toml"
+assert main(["design", str(shipped), "-o", "out"]) == 0
 assert main(["shape", "out/design.toml", "--pressure-kPa", "10,20,40"]) == 0
 """
 #: what other systems than Linux lack: installed code that designs never asks for it
@@ -154,8 +136,7 @@ def test_installed_it_imports_with_numpy_and_scipy_alone(python, folder):
 def test_installed_it_designs_and_predicts(python, folder):
     """In one process, so that what the law works out once serves both."""
     told_version = run(python.with_name("pneunet"), "--version", cwd=folder).stdout
-    (folder / "arc.toml").write_text(ARC)
-    told = run(python, "-c", DESIGN_AND_SHAPE, SHIPPED or "arc.toml", cwd=folder).stdout
+    told = run(python, "-c", DESIGN_AND_SHAPE, cwd=folder).stdout
     assert told.count("no picture: ") == told.count("no pictures: ") == 1
     assert told.count("pip install 'pneunet[pictures]'") == 2
     with open(folder / "out" / "shape" / "centrelines.csv", newline="") as stream:
@@ -164,11 +145,11 @@ def test_installed_it_designs_and_predicts(python, folder):
     assert told_version == f"pneunet {revision}\n" and re.fullmatch(r"[\d.]+", revision)
 
 
-@pytest.mark.parametrize("command", ["solve", "mesh", "cell", "study", "campaign"])
+@pytest.mark.parametrize("command", ["solve", "mesh", "export", "cell", "study", "campaign"])
 def test_what_needs_more_says_what_to_install(python, folder, command):
     design = ROOT / "hifi" / "verification" / "data" / "reference.toml"
     done = run(python.with_name("pneunet"), command, design, "-o", "out", cwd=folder, code=2)
     assert done.stderr.count("\n") == 1 and done.stdout == ""
     assert done.stderr.startswith("pneunet: ") and " is missing here: " in done.stderr
-    assert ("pip install gmsh" if command == "mesh" else "make setup") in done.stderr
+    assert ("pip install gmsh" if command in ("mesh", "export") else "make setup") in done.stderr
     assert not any(path.name != ".git" and any(path.iterdir()) for path in folder.iterdir())

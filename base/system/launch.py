@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pneunet.base.errors import InputError
+from pneunet.base.quantities import listed
 from pneunet.base.system.doorman import end_with_parent
 from pneunet.base.system.interrupts import EXIT_CODE, HANDED_ON, Handler, handled
 from pneunet.base.system.log import complain, under_launcher
@@ -46,8 +47,8 @@ SETTINGS = {
 #: more than this is a slip of the pen, which would bring the machine down
 RANKS_PER_CORE = 64
 HEARING_SECONDS = 0.3
-#: sub-commands whose ranks would all do the same
-SERIAL = ("design", "shape", "mesh", "cell", "suggest", "report", "fit-material", "doctor")
+#: sub-commands whose ranks share the work; of others they would all do the same
+PARALLEL = ("solve", "study", "campaign", "train", "workspace")
 
 
 def environment() -> dict[str, str]:
@@ -73,8 +74,11 @@ def command_line(ranks: int, command: list[str]) -> list[str]:
         raise InputError(
             "run: no command given: pneunet run -n 2 solve DESIGN.toml, or pneunet run -n 2 -- PROGRAM ..."
         )
-    if ranks > 1 and command[0] in SERIAL:
-        raise InputError(f"run: pneunet {command[0]} works on one rank: leave out run -n {ranks}")
+    if ranks > 1 and command[0] not in ("--", *PARALLEL):
+        raise InputError(
+            f"run: {command[0]} works on one rank: leave out run -n {ranks}, which is for {listed(PARALLEL)},"
+            " or after -- for any program"
+        )
     return ["mpirun", "-n", str(ranks), *program]
 
 

@@ -10,6 +10,7 @@ _SOLVERS = (
     "pip does not bring finite elements; on Debian 12 or 13 run 'make setup' in a checkout of pneunet,"
     " elsewhere use its container image ('make image')"
 )
+_VIEW = "install it with: pip install 'pneunet[view]'"
 _PICTURES = "install it with: pip install 'pneunet[pictures]'"
 #: module -> what to do where it is missing
 MISSING = {
@@ -17,6 +18,7 @@ MISSING = {
     **dict.fromkeys(("pyvista", "vtk", "vtkmodules", "matplotlib", "PIL"), _PICTURES),
     **dict.fromkeys(("trimesh", "manifold3d"), "install it with: pip install 'pneunet[moulds]'"),
     **dict.fromkeys(("fcntl", "resource"), "this runs on Linux alone; elsewhere use the container image"),
+    **dict.fromkeys(("plotly", "imageio_ffmpeg"), _VIEW),
     "gmsh": "install it with: pip install gmsh (in a checkout on Debian: make setup)",
 }
 

@@ -19,7 +19,17 @@ from pneunet.base.units import KPA_PER_MPA, LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.measured.fit import CastingFit, fit_casting
 from pneunet.design.measured.prediction import Aligned, Predicted, align, one_marker
-from pneunet.design.measured.table import BASE, MARKERS, TIP, Measurement, read_measured, read_places
+from pneunet.design.measured.table import (
+    BASE,
+    CENTRELINE,
+    DISPLACEMENT,
+    MARKERS,
+    TIP,
+    Measurement,
+    read_measured,
+    read_places,
+)
+from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.target.metrics import compare as compare_curves
 from pneunet.geometry.designfile import DesignFile, write_design_file
 from pneunet.geometry.parameters import Manipulator
@@ -40,7 +50,9 @@ class MeasuredComparison:
     """A measurement beside what a design's law predicts. Values are in the target's coordinates.
 
     measured: as it was read; predicted: as the design is; aligned: the measurement, registered; fit: the
-    casting that the measurement speaks for, None where it says nothing (why: `no_fit`).
+    casting that the measurement speaks for, None where it says nothing (why: `no_fit`). solved: of finite
+    elements in the folder, where the tip was measured: (pressures (m,) in kPa, how far the tip has gone
+    (m,) in mm).
     """
 
     design: Design
@@ -50,6 +62,7 @@ class MeasuredComparison:
     fit: CastingFit | None
     no_fit: str = ""
     as_is: bool = False
+    solved: tuple[np.ndarray, np.ndarray] | None = None
 
     def __repr__(self) -> str:
         rms = f"RMS {self.rms:.3g} {self.measured.unit} ({self.percent(self.rms):.2g} %)"
@@ -102,6 +115,22 @@ class MeasuredComparison:
             return None
         seen = np.isfinite(self.errors[self.loaded])
         return float(np.mean((self.errors <= self.bars)[self.loaded][seen]))
+
+    @property
+    def way(self) -> np.ndarray:
+        """(n,) mm, how far the last point measured has gone from where it was at the first level."""
+        values = self.aligned.values[:, -1]
+        return np.linalg.norm(values - values[0], axis=1) if values.shape[1] == 3 else values[:, 0]
+
+    @property
+    def solved_rms(self) -> float | None:
+        """RMS of the tip's way, measured less that of the finite elements, as far as those went, mm."""
+        if self.solved is None:
+            return None
+        kPa, way = self.solved
+        within = (self.pressures_kPa <= 1.001 * kPa[-1]) & (np.arange(len(self.way)) >= self.loaded.start)
+        off = (self.way - np.interp(self.pressures_kPa, kPa, way))[within]
+        return float(np.sqrt(np.nanmean(off**2))) if len(off) else None
 
     @cached_property
     def fitted(self) -> np.ndarray | None:
@@ -171,6 +200,7 @@ class MeasuredComparison:
             "turn_from_loaded_shapes": self.aligned.turned,
             "registration": None if self.aligned.pose is None else self.aligned.pose.tolist(),
             "inside_90_percent_bars": self.inside,
+            "finite_elements_way_of_tip_rms_mm": self.solved_rms,
         }
         if self.fit is None:
             return out | {"fit": None, "no_fit": self.no_fit}
@@ -192,6 +222,11 @@ class MeasuredComparison:
             out.append(f"within the prediction's own 90 % bars: {100 * self.inside:.0f} % of the points")
         else:
             out.append(f"no bars: the law '{self.predicted.law.name}' does not know how wrong it is")
+        if self.solved is not None and self.solved_rms is not None:
+            out.append(
+                f"finite elements in this folder: the tip's way differs by {self.solved_rms:.3g} mm RMS,"
+                f" up to {self.solved[0][-1]:.4g} kPa"
+            )
         if self.fit is None:
             return [*out, f"no fit: {self.no_fit}"]
         f, c = self.fit, self.consequences
@@ -205,6 +240,8 @@ class MeasuredComparison:
         if f.wall_interval:
             told += f" (90 %: {f.wall_interval[0]:+.3f} to {f.wall_interval[1]:+.3f})"
         out.append(f"best fit: {told}; RMS {f.rms:.3g} {unit}")
+        if f.at_the_edge:
+            return [*out, "no modulus in reach fits: is it this body, in these units?"]
         out.append(
             f"so the shape designed for {c['design_pressure_kPa']:.4g} kPa needs"
             f" {c['pressure_for_the_shape_kPa']:.4g} kPa; at {c['design_pressure_kPa']:.4g} kPa the tip is"
@@ -292,7 +329,21 @@ def compare(
         if fit_wall:
             raise
         why = str(error)
-    return MeasuredComparison(design, predicted.measured, predicted, aligned, fit, why, as_is)
+    solved = None if isinstance(run, Design) else _solved(Path(run), found)
+    return MeasuredComparison(design, predicted.measured, predicted, aligned, fit, why, as_is, solved)
+
+
+def _solved(run: Path, measured: Measurement) -> tuple[np.ndarray, np.ndarray] | None:
+    """MeasuredComparison.solved; None where there are no finite elements, or the tip was not measured."""
+    at_tip = measured.what in (CENTRELINE, DISPLACEMENT) or measured.names[-1:] == (TIP,)
+    folder = run if run.is_dir() else run.parent
+    if not at_tip or not (folder / "solve").is_dir():
+        return None
+    solve = read_design_folder(folder).solve
+    if solve is None:
+        return None
+    tips = np.column_stack([solve.steps[f"tip_{axis}_mm"] for axis in "xyz"])
+    return solve.steps["pressure_kPa"], np.linalg.norm(tips - tips[0], axis=1)
 
 
 def _places(measured: Measurement, design: Design, markers) -> np.ndarray:

@@ -53,6 +53,12 @@ class CastingFit:
         law = 0.0 if self.half_of_law is None else self.half_of_law[i]
         return float(np.hypot(self.half[i], law))
 
+    @property
+    def at_the_edge(self) -> bool:
+        """Whether the modulus is the last one that was tried: another body, or another unit, was measured."""
+        low, high = FACTORS
+        return not 1.01 * low < self.change.modulus < 0.99 * high
+
     def table(self) -> dict:
         """By file key."""
         out: dict = {"modulus_factor": self.change.modulus, "rms": self.rms}

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pneunet.base.pictures.rendering import figure
-from pneunet.design.report.labels import REDUCED, TARGET
+from pneunet.design.report.labels import FINITE_ELEMENTS, REDUCED, TARGET
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +47,8 @@ def _over_pressure(ax, found, points):
     if found.fitted is not None:
         label = f"modulus x {found.fit.change.modulus:.3f}"
         ax.plot(kPa, _told(found.fitted, points)[:, last], "--", color=FITTED, label=label)
+    if found.solved is not None:
+        ax.plot(*found.solved, ":", color=FINITE_ELEMENTS, label="finite elements")
     spread = found.measured.spread[:, last]
     ax.errorbar(kPa, measured, np.nan_to_num(spread), fmt="o", color=TARGET, markersize=4, label="measured")
     name = found.measured.names[last] if found.measured.names else "tip"

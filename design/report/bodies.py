@@ -59,35 +59,41 @@ def painted(mesh: "PolyData") -> list[tuple["PolyData", dict]]:
 
 
 def read_solution(path: str | Path) -> "UnstructuredGrid":
-    """The last step of a ParaView collection as the undeformed pyvista grid with its point data; InputError
-    where that is damaged."""
+    """The last step of a ParaView collection, as `read_step` gives it."""
+    return read_step(listed_steps(path)[-1])
+
+
+def listed_steps(path: str | Path) -> list[Path]:
+    """The files that a ParaView collection names, in order, all of them beside it; InputError otherwise."""
+    try:
+        listed = ElementTree.fromstring(read_text(path)).findall(".//DataSet")
+        listed.sort(key=lambda each: float(each.get("timestep", "nan")))
+    except (ElementTree.ParseError, ValueError) as error:
+        raise InputError(f"{path}: is damaged ({error})") from None
+    names = [each.get("file", "") for each in listed]
+    if not names:
+        raise InputError(f"{path}: is damaged (it names no file)")
+    if any(not name or Path(name).name != name for name in names):
+        raise InputError(f"{path}: names a file that does not lie beside it")
+    return [Path(path).with_name(name) for name in names]
+
+
+def read_step(path: str | Path) -> "UnstructuredGrid":
+    """A step's file as the undeformed pyvista grid with its point data; InputError where that is damaged."""
     from vtkmodules.vtkCommonCore import vtkObject
 
     shown = vtkObject.GetGlobalWarningDisplay()
     vtkObject.GlobalWarningDisplayOff()  # the reader's own words come in many lines
     try:
-        name = _last_step(path)
-        grid = _read_grid(name)
+        grid = _read_grid(path)
     finally:
         vtkObject.SetGlobalWarningDisplay(shown)
     corners = np.asarray(grid.cell_connectivity) if grid.n_cells else np.zeros(1, int)
     moved = grid.point_data.get("displacement", np.empty(0))
     sound = grid.n_cells and corners.min() >= 0 and corners.max() < grid.n_points
     if not sound or np.shape(moved) != (grid.n_points, 3) or not np.isfinite([moved, grid.points]).all():
-        raise InputError(f"{name}: is damaged: it holds no body with finite displacements")
+        raise InputError(f"{path}: is damaged: it holds no body with finite displacements")
     return grid
-
-
-def _last_step(path):
-    """The last file that a collection names, which lies beside it."""
-    try:
-        listed = ElementTree.fromstring(read_text(path)).findall(".//DataSet")
-        name = max(listed, key=lambda each: float(each.get("timestep", "nan"))).get("file", "")
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InputError(f"{path}: is damaged ({error})") from None
-    if not name or Path(name).name != name:
-        raise InputError(f"{path}: names a file that does not lie beside it")
-    return Path(path).with_name(name)
 
 
 def _read_grid(path):

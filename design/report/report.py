@@ -27,6 +27,7 @@ from pneunet.design.report.comparison import (
 from pneunet.design.report.drawing import draw_drawing, segment_table
 from pneunet.design.report.labels import kPa, plain, segment_name, signed, significant
 from pneunet.design.report.rundata import read_design_folder
+from pneunet.design.report.viewing import framed
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.laws import SegmentLaw
 
@@ -94,6 +95,7 @@ def _write(run, law, folder):
     body = _headline(run, comparison)
     for title, content in (
         ("Target, prediction, finite elements", lambda: _shapes(run, comparison, scene, folder)),
+        ("To turn by hand", lambda: framed(run.directory)),
         ("Errors", lambda: _errors(comparison, run)),
         ("Strains of the segments", lambda: _strains(run, comparison)),
         ("Load history", lambda: _history(run, law, folder)),

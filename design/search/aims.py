@@ -12,7 +12,7 @@ import numpy as np
 from pneunet.base import se3
 from pneunet.design.target.shapes import TargetShape
 from pneunet.design.target.target import Target
-from pneunet.reduced.rod.placing import Placed, PlacedRod
+from pneunet.reduced.rod.placing import PlacedRod, Stations
 
 PAIRED, EQ27 = "paired", "eq27"
 OBJECTIVES = (PAIRED, EQ27)
@@ -73,22 +73,22 @@ class Aim:
                 aims.append(cls(last, point[None], weights=weight * last, pressure=float(pressure)))
         return tuple(aims)
 
-    def stations(self, rod: PlacedRod) -> Placed:
+    def stations(self, rod: PlacedRod) -> Stations:
         """Where the rod is that is to meet the points."""
         if not self.nearest:
             return rod.at(self.fractions)
         fine = np.linspace(0, 1, FINE)
         return rod.at(_nearest(rod.points(fine), fine, self.points), sliding=False)
 
-    def misfit(self, placed: Placed) -> np.ndarray:
+    def misfit(self, placed: Stations) -> np.ndarray:
         """(r,) in mm, whose squared norm is the mean squared distance."""
         parts = [(placed.points - self.points).ravel()]
         if self.edges is not None:
             parts.append((self.half_width * placed.poses[:, :3, 1:3] - self.edges).ravel())
         return self._weighed(np.concatenate(parts))
 
-    def slopes(self, placed: Placed, turns: np.ndarray, moves: np.ndarray) -> np.ndarray:
-        """(r, n) derivatives of the misfit, of turns and moves (s, 3, n) of the stations as in Placed."""
+    def slopes(self, placed: Stations, turns: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """(r, n) derivatives of the misfit, of turns and moves (s, 3, n) of the stations as in Stations."""
         parts = [moves.reshape(3 * len(moves), moves.shape[2])]
         if self.edges is not None:
             columns = np.swapaxes(placed.poses[:, :3, 1:3], 1, 2)
@@ -98,7 +98,7 @@ class Aim:
         return self._weighed(np.vstack(parts))
 
     def _weighed(self, rows):
-        """Rows of the points, then of the edges, so that squares add up to the points' mean and the edges'."""
+        """Rows of the points, then of the edges, whose squares add up to the points' mean and the edges'."""
         count = len(self.points)
         weights = np.ones(count) if self.weights is None else self.weights
         each = [np.repeat(np.sqrt(weights / count), 3)]

@@ -168,7 +168,7 @@ class _Search:
         alternatives = self._alternatives(best, whole, guesses)
         if alternatives and alternatives[0].rms < BETTER * best.rms:
             best, alternatives = alternatives[0], (best, *alternatives[1:])
-        touching = about_to_touch(best.manipulator.segments, float(best.pressures.max()))
+        touching = () if self.target.casting.allow_touch else _touching(best)
         return Found(
             best, alternatives, (*(text for _, text in bounds), *touching), stopped, flush, self.evaluations
         )
@@ -218,8 +218,8 @@ class _Search:
 
     def _grid(self):
         casting = self.target.casting
-        names = ("wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall")
-        names += ("cavity_thickness", "gap", "end_margin", "plain_length")
+        names = ["wall", "base_thickness", "roof", "chamber_height", "top_wall", "side_wall"]
+        names += ["cavity_thickness", "gap", "end_margin", "plain_length"]
         steps = dict.fromkeys(names, casting.grid or 0.001)
         return {"angle": casting.angle_grid or 0.01} | steps
 
@@ -246,7 +246,8 @@ class _Search:
 
     def _alternatives(self, best, whole, guesses):
         """Distinct Candidates that are not much worse."""
-        found, allowed = [], max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
+        found: list[Candidate] = []
+        allowed = max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
         for other in self._others(whole, guesses) if self.most else ():
             if np.sqrt(other[1].at.misfit) > allowed:
                 continue
@@ -270,7 +271,7 @@ class _Search:
         for guess in apart:
             first = start(self.target, self.pieces, self.law, guess)
             if found := self._try(_held_near(first, guess.pressure), STEPS):
-                yield self._whole(*found, tried=1)
+                yield self._whole(found[0], found[1], tried=1)
         body = whole[0].body
         longest = int(np.argmax(body.counts))
         for change in (1, -1):
@@ -318,7 +319,10 @@ def start(target: Target, pieces: tuple[Extracted, ...], law: SegmentLaw, guess:
     values = np.array([np.clip(body.value(v), v.low, v.high) for v in variables])
     body = body.changed(variables, values)
     gravity = np.array(target.gravity)
-    return _turned_to_target(Problem(aims, pieces, law, tuple(variables), body, turns, gravity))
+    touch = target.casting.allow_touch
+    return _turned_to_target(
+        Problem(aims, pieces, law, tuple(variables), body, turns, gravity, may_touch=touch)
+    )
 
 
 def _turned_to_target(problem):
@@ -364,6 +368,10 @@ def _active(problem, optimum):
         saved = np.sqrt(at.misfit) - np.sqrt(max(at.misfit - max(outwards, 0.0) * step, 0.0))
         worth = f"; {told} beyond would save {saved:.2g} mm" if saved >= WORTH_TELLING else ""
         yield float(saved) * (saved >= WORTH_TELLING), variable.text(value) + worth
+
+
+def _touching(candidate):
+    return about_to_touch(candidate.manipulator.segments, float(candidate.pressures.max()))
 
 
 def about_to_touch(segments: Sequence[Segment], pressure: float) -> Iterator[str]:

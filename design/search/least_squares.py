@@ -21,8 +21,11 @@ ENOUGH = 1e-3
 class Linearised(Protocol):
     """What a residual is near x: residual (m,), jacobian (m, n)."""
 
-    residual: np.ndarray
-    jacobian: np.ndarray
+    @property
+    def residual(self) -> np.ndarray: ...
+
+    @property
+    def jacobian(self) -> np.ndarray: ...
 
 
 L = TypeVar("L", bound=Linearised)

@@ -67,9 +67,9 @@ def first_guesses(
         best.append(_nearest(piece, prototype, *tables[key]))
     guesses = []
     for j, pressure in enumerate(pressures):
-        misfits, segments, counts = zip(*(entries[j] for entries in best))
+        misfits, chosen, counts = zip(*(entries[j] for entries in best))
         if np.isfinite(sum(misfits)):
-            guesses.append(Guess(float(pressure), segments, counts, float(sum(misfits))))
+            guesses.append(Guess(float(pressure), chosen, counts, float(sum(misfits))))
     return sorted(guesses, key=lambda guess: guess.misfit)
 
 

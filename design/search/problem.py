@@ -26,7 +26,7 @@ from pneunet.reduced.rod.piece_slopes import (
     piece_twists,
     strain_slopes,
 )
-from pneunet.reduced.rod.placing import Placed, PlacedRod
+from pneunet.reduced.rod.placing import PlacedRod, Stations
 from pneunet.reduced.rod.states import StatesWithSlopes
 
 #: mm of misfit per mm that facing walls would overlap: contact is not designed into
@@ -84,7 +84,7 @@ class Shape:
     axes of space, besides those of a rigid body; states: of the cells; strain_moves (s, 3, n, 6): derivatives
     of the points by the cells' free strains, where they were asked for."""
 
-    placed: Placed
+    placed: Stations
     turns: np.ndarray
     moves: np.ndarray
     base_turns: np.ndarray
@@ -109,7 +109,7 @@ class Evaluation:
 class Problem:
     """The problem around a Body: variables, then turns of the base about axes (the columns of `turns` (3, t),
     in base axes) are what is sought. gravity (3,) in mm/s2; everything: derivatives by fields
-    that do not vary are wanted too."""
+    that do not vary are wanted too. may_touch: facing walls may."""
 
     aims: tuple[Aim, ...]
     pieces: tuple[Extracted, ...]
@@ -119,6 +119,7 @@ class Problem:
     turns: np.ndarray
     gravity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     everything: bool = False
+    may_touch: bool = False
 
     @cached_property
     def x(self) -> np.ndarray:
@@ -226,7 +227,7 @@ class Problem:
     def _touching(self, body):
         """TOUCH times by how much facing walls of each segment are expected to pass through each other."""
         rows, slopes = [], []
-        for number, pressures in enumerate(body.pressures):
+        for number, pressures in enumerate(() if self.may_touch else body.pressures):
             for i, (segment, pressure) in enumerate(zip(body.segments, pressures)):
                 if segment.kind == PASSIVE:
                     continue

@@ -98,6 +98,8 @@ def limits(target: Target, piece: Extracted, segment: Segment) -> dict[str, tupl
         if segment.kind == TWISTING:
             ranges.pop("base_thickness", None)
         _check_vary(target.vary, segment)
+    elif "wall" in ranges:
+        ranges = ranges | {"wall": (target.casting.walls, ranges["wall"][1])}
     given = "end_margin" in target.start and "end_margin" not in (target.vary or {})
     dropped = ("angle",) * (piece.kind == BENDING) + ("end_margin",) * given
     return {name: both for name, both in ranges.items() if name not in dropped}

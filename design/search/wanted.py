@@ -10,6 +10,7 @@ from pneunet.design.search.possible import out_of_reach
 from pneunet.design.search.space import RANGES, limits, prototype
 from pneunet.design.segmentation.segment import segment
 from pneunet.design.segmentation.segmentation import Segmentation
+from pneunet.design.segmentation.windows import arc_lengths
 from pneunet.design.target.extraction import Extracted, extract
 from pneunet.design.target.points import STRIDE, strides
 from pneunet.design.target.reach import ANGLES, reach
@@ -26,13 +27,8 @@ LOADED_TOLERANCE = 1e-2
 #: of the length: a polyline that differs by more from the fitted curve is noisy or too coarse to be followed
 FAITHFUL = 2e-3
 
-#: what a target may ask for that the search does not use yet, by field of Target
-NOT_YET = {
-    "weights": "weights of points",
-    "gravity": "gravity",
-    "shapes": "further shapes",
-    "tip": "points of the tip",
-}
+#: of noise or tolerance: points that lie farther off the fitted curve are not on it
+EXPLAINED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,27 +49,26 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
     if all(piece.kind == PASSIVE for piece in found.pieces):
         raise InputError(
             "the curve is straight and no twist is asked for: a plain piece of silicone follows it, and"
-            " there is"
-            " nothing to inflate; give points that bend, frames that turn, or a [[piece]] with tau_rad_per_mm"
+            " there is nothing to inflate; give points that bend, frames that turn, or a [[piece]] with"
+            " tau_rad_per_mm"
         )
-    unused = [words for name, words in NOT_YET.items() if np.any(getattr(target, name))]
-    told = (f"NOT used by the search yet: {', '.join(unused)}",) if unused else ()
-    return replace(found, notes=(*found.notes, *told, *out_of_reach(target, found.pieces, law)))
+    return replace(found, notes=(*found.notes, *out_of_reach(target, found.pieces, law)))
 
 
 def _given_or_found(target, law):
     if target.pieces and not target.split.refine:
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
-    options = target.split
-    if options.tolerance is None:
-        options = replace(
-            options, tolerance=(LOADED_TOLERANCE if any(target.gravity) else TOLERANCE) * _chords(target)
-        )
+    tolerance, options = target.split.tolerance, target.split
+    if tolerance is None:
+        tolerance = (LOADED_TOLERANCE if any(target.gravity) else TOLERANCE) * _chords(target)
+        options = replace(options, tolerance=tolerance)
     split = segment(target, options=options, reach=reachable(target, law))
+    explained = split.rms <= EXPLAINED * max(split.noise, tolerance)
+    curve = split.curve if explained else Curve(arc_lengths(target.points)[0])
     followed, notes = target, split.notes
-    if abs(target.length - split.length) > FAITHFUL * split.length:
-        followed = _on_curve(target, split.curve)
-        told = f"{target.length:.1f} mm as a polyline, {split.length:.1f} mm smoothed"
+    if abs(target.length - curve.length) > FAITHFUL * curve.length:
+        followed = _on_curve(target, curve)
+        told = f"{target.length:.1f} mm as a polyline, {curve.length:.1f} mm smoothed"
         notes += (f"followed is the smooth curve: noise {split.noise:.2g} mm a coordinate; {told}",)
     scale = followed.length / split.length
     pieces = tuple(replace(p, length=p.length * scale) for p in _extracted(split, followed))

@@ -48,10 +48,11 @@ def with_whole_chambers(
         return [found] if found else []
     span = np.linalg.qr(J[:, free])[0]
     left, slopes = r - span @ (span.T @ r), J[:, of_chambers] - span @ (span.T @ J[:, of_chambers])
-    around = [
-        sorted({max(1, int(np.floor(x[j]))), max(1, int(np.ceil(x[j])))}, key=lambda n, j=j: abs(n - x[j]))
-        for j in of_chambers
-    ]
+    around = []
+    for value in x[of_chambers].tolist():
+        nearest = max(1, round(value))
+        other = max(1, int(np.floor(value)) + int(np.ceil(value)) - nearest)
+        around.append([nearest] if other == nearest else [nearest, other])
     combinations = np.array(list(islice(product(*around), MOST_COMBINATIONS)), float)
     promised = np.sum((left[:, None] + slopes @ (combinations - x[of_chambers]).T) ** 2, axis=0)
     done: list[Found] = []

@@ -45,11 +45,10 @@ def wall_stretch(segment: Segment, pressure: float) -> float:
 
 def _touch(design, solved):
     told = None if solved is None else solved.record.get("first_touch_kPa")
-    if solved is not None:
-        if told is not None:
-            yield Limit(told * MPA_PER_KPA, "walls of neighbouring chambers touch (finite elements)")
+    if told is not None:
+        yield Limit(told * MPA_PER_KPA, "walls of neighbouring chambers touch (finite elements)")
         return
-    pressure, i = _first(design, lambda s, p: gap_left(s, p))
+    pressure, i = _first(design, gap_left, solved)
     if i is not None:
         yield Limit(pressure, f"walls of segment {i} touch (estimate by plates, which is early by a quarter)")
 
@@ -66,8 +65,8 @@ def _break(design, solved):
         if len(over):
             pressure = steps["pressure_kPa"][over[0]] * MPA_PER_KPA
             yield Limit(pressure, f"stretch {most:.2f}, half of the elongation at break (finite elements)")
-        return
-    pressure, i = _first(design, lambda s, p: allowed.get(s.material, np.inf) - wall_stretch(s, p))
+            return
+    pressure, i = _first(design, lambda s, p: allowed.get(s.material, np.inf) - wall_stretch(s, p), solved)
     if i is not None:
         most = allowed[design.manipulator.segments[i - 1].material]
         yield Limit(
@@ -77,9 +76,12 @@ def _break(design, solved):
         )
 
 
-def _first(design: DesignFile, left: Callable[[Segment, float], float]) -> tuple[float, int | None]:
+def _first(
+    design: DesignFile, left: Callable[[Segment, float], float], solved: Solution | None
+) -> tuple[float, int | None]:
     """(lowest of the largest pressures, MPa, at which left(segment, its pressure) is 0; number of that
-    segment), (inf, None) where it is positive for all up to FARTHEST."""
+    segment), (inf, None) where it is positive for all up to FARTHEST. Not below what was solved without
+    it."""
     top = FARTHEST * design.largest_pressure
     found: list[tuple[float, int | None]] = [(np.inf, None)]
     for i, s in enumerate(design.manipulator.segments):
@@ -90,7 +92,8 @@ def _first(design: DesignFile, left: Callable[[Segment, float], float]) -> tuple
 
         if s.chambers and of(top) < 0:
             found.append((float(brentq(of, 0.0, top, xtol=1e-6)), i + 1))
-    return min(found, key=lambda each: each[0])
+    pressure, number = min(found, key=lambda each: each[0])
+    return max(pressure, solved.pressure if solved else 0.0), number
 
 
 def _limit_point(design, law, solved):

@@ -147,7 +147,8 @@ def _cast(pack):
         Steps(
             [
                 *steps,
-                "Let it cure as the maker says. Cut the risers, lift the plate straight off: the cores have"
+                "Let it cure as the maker says. Cut the risers, slip a blade under a corner and"
+                " lift the plate straight off: the cores have"
                 " no undercut. Peel the layer out of its tray from one end.",
             ]
         )
@@ -170,6 +171,12 @@ def _bond(pack):
             "Join the runs end to end in the assembly jig, from base to tip. A greased rod through the"
             " channels keeps them open where they go on; pull it out through the port or a cut at the tip."
         )
+        floors = {round(s.cavity_floor, 6) for s in pack.design.manipulator.segments if s.chambers}
+        if len(floors) > 1:
+            steps.append(
+                "For the next design: segments with one cavity_floor_mm and no quarter turn between them are"
+                " cast in one piece."
+            )
     if groups > 1:
         steps.append(
             f"There are {groups} pressure groups. The bulkheads between them are cast with the layers: test"

@@ -1,12 +1,12 @@
 """`Moulds`: what the moulds of a body are like, apart from the body."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.quantities import Checked, quantity
-from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.base.quantities import Checked, quantities, quantity
+from pneunet.geometry.parameters import OF_CHAMBERS, Manipulator, Segment
 
 #: mm: what a printer still prints as a fin
 THINNEST_FIN = 0.4
@@ -64,15 +64,20 @@ def printed(manipulator: Manipulator, moulds: Moulds) -> Manipulator:
     InputError where a parameter of the moulds does not go with the body."""
     scale = 1 / (1 - moulds.shrinkage)
     segments = [
-        replace(
-            s,
-            **{f.name: getattr(s, f.name) * scale for f in fields(s) if f.metadata.get("unit") == "mm"},
-        )
-        for s in manipulator.segments
+        replace(s, **{name: scale * getattr(s, name) for name in _lengths(s)}) for s in manipulator.segments
     ]
     for i, s in enumerate(segments, start=1):
         _check(f"segment {i}", s, moulds)
     return Manipulator(tuple(segments))
+
+
+def _lengths(s):
+    """Fields of a segment that are lengths."""
+    return [
+        f.name
+        for key, f in quantities(Segment).items()
+        if f.metadata["unit"] == "mm" and (s.chambers or key not in OF_CHAMBERS)
+    ]
 
 
 def _check(where: str, s: Segment, moulds: Moulds) -> None:

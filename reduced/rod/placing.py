@@ -19,7 +19,7 @@ LARGEST_TURN = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class Stations:
     """Stations of a rod: poses (s, 4, 4); turns, moves (s, 3, 6 m): derivatives by the pieces' twists (m, 6)
     of the frames, d column = (turns dX) x column, and of their origins, mm."""
 
@@ -94,7 +94,7 @@ class PlacedRod:
         steps = se3.exp_pose(t[:, None] * self._elements[element])
         return (self._joints[0][element] @ steps)[:, :3, 3]
 
-    def at(self, fractions: np.ndarray, sliding: bool = True) -> Placed:
+    def at(self, fractions: np.ndarray, sliding: bool = True) -> Stations:
         """The stations at fractions (s,) of the deformed length; sliding: these fractions are kept as pieces
         change, otherwise the shares of the pieces that they lie at."""
         piece, share, element, t = self._elements_at(fractions)
@@ -107,7 +107,7 @@ class PlacedRod:
             shift = self._shift(np.asarray(fractions, float), piece, share)
             by += (adjoint(poses) @ self.twists[piece, :, None])[..., None] * shift[:, None]
         by = by.reshape(len(piece), 6, -1)
-        return Placed(poses, by[:, :3], by[:, 3:] - se3.hat(poses[:, :3, 3]) @ by[:, :3])
+        return Stations(poses, by[:, :3], by[:, 3:] - se3.hat(poses[:, :3, 3]) @ by[:, :3])
 
     def _shift(self, fractions, piece, share):
         """(s, m, 6) derivatives of the shares of the pieces that stations at fractions of the length lie

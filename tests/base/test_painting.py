@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pneunet.base.pictures.depth import shaded
 from pneunet.base.pictures.painting import paint, sharp_edges
 from pneunet.base.pictures.rendering import View
 from pneunet.base.pictures.vtp import write_quads
@@ -36,3 +37,17 @@ def test_a_surface_s_file_is_read_by_vtk(tmp_path):
     write_quads(tmp_path / "cube.vtp", CORNERS, FACES, {"segment": np.arange(6)})
     mesh = pyvista.read(tmp_path / "cube.vtp")
     assert mesh.volume == pytest.approx(1.0) and (mesh.cell_data["segment"] == np.arange(6)).all()
+
+
+def test_of_crossing_surfaces_the_nearest_is_seen_at_every_pixel():
+    """A face twice as large that lies low around a cube is seen around it and not inside; no sorting of whole
+    faces could tell."""
+    top = FACES[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    sheet = (CORNERS - 0.5) * [2, 2, 0.2] + [0.5, 0.5, 0.2]
+    points, triangles = np.vstack([CORNERS, sheet]), np.vstack([top, top + 8])
+    picture = shaded(ABOVE, points, triangles, (200, 200, 200), (120, 80))
+    assert picture.shape == (80, 120, 3)
+    covered = (picture < 250).any(axis=-1)  # 20 pixels a mm
+    assert covered.sum() == pytest.approx(40 * 40, rel=0.1)
+    rows = np.flatnonzero(np.abs(np.diff(picture[:, 60, 0])) > 20)
+    assert {30, 50} <= {int(round(r, -1)) for r in rows}  # the cube's edges, drawn over the sheet

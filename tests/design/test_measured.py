@@ -16,10 +16,12 @@ from pneunet.design.measured.comparison import compare
 from pneunet.design.measured.prediction import Change
 from pneunet.design.measured.registration import line_of, register, turned_about
 from pneunet.design.measured.table import read_measured
+from pneunet.design.report.rundata import read_design_folder
 from pneunet.geometry.designfile import read_design_file
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced import AnalyticLaw
+from tests.design.fake_run import PLANE, make_run
 
 MU, FACTOR = 0.2, 1.25
 KPA = (0, 8, 16, 24)
@@ -166,6 +168,11 @@ def test_the_laws_bars_are_those_of_its_strains(tmp_path):
     assert found.inside is not None
 
 
+def test_another_body_or_unit_is_not_taken_for_a_modulus(tmp_path):
+    write_csv(tmp_path / "m.csv", ["p_kPa", "displacement_mm"], [[0, 0], [12, 0.01], [24, 0.02]])
+    assert "in these units?" in compare(design(), tmp_path / "m.csv").lines()[-1]
+
+
 def test_rows_of_a_ramp_become_levels_with_their_scatter(tmp_path):
     rng = np.random.default_rng(3)
     p = np.concatenate([np.full(50, -0.02), np.linspace(0.5, 30, 900)])
@@ -187,6 +194,20 @@ def test_names_of_markers_in_a_row_above_are_numbered(tmp_path):
     found = read_measured(tmp_path / "m.csv")
     assert found.names == ("1", "2") and found.pressures[1] == pytest.approx(0.02)
     assert found.values[1, 1] == pytest.approx([40, 0, 20])
+
+
+def test_finite_elements_of_the_folder_stand_beside_it(tmp_path):
+    """Those of the made-up run are the model with every strain times a factor: measured is half of that."""
+    make_run(tmp_path / "run", segments=(PLANE,), fields=False)
+    steps = read_design_folder(tmp_path / "run").solve.steps
+    tips = np.column_stack([steps[f"tip_{axis}_mm"] for axis in "xyz"])
+    way = np.linalg.norm(tips - tips[0], axis=1)
+    write_csv(
+        tmp_path / "m.csv", ["p_kPa", "displacement_mm"], np.column_stack([steps["pressure_kPa"], way / 2])
+    )
+    found = compare(tmp_path / "run", tmp_path / "m.csv")
+    assert found.solved_rms == pytest.approx(np.sqrt(np.mean((way[1:] / 2) ** 2)), rel=1e-6)
+    assert any("finite elements" in line for line in found.lines())
 
 
 BAD = {

@@ -114,7 +114,7 @@ def test_draft_and_fillets_thicken_walls_alone():
 
 
 def test_moulds_make_up_for_shrinkage():
-    body = Manipulator((twisting(),))
+    body = Manipulator((twisting(), PASSIVE))
     grown = cast(mould_parts(body, Moulds(shrinkage=0.02))).volume()
     assert grown * 0.98**3 == pytest.approx(body_part(body, EXACT, ports=False).volume, rel=1e-9)
 

@@ -85,7 +85,11 @@ TARGETS = {
         "pressure_kPa = 80\n[[piece]]",
         ["pressure_kPa = 80", "0..60 kPa"],
     ),
-    "unknown kind": ('"bending"', '"bent"', ["kind = 'bent'", "write 'twisting', 'bending' or 'helical'"]),
+    "unknown kind": (
+        '"bending"',
+        '"bent"',
+        ["kind = 'bent'", "write 'passive', 'twisting', 'bending' or 'helical'"],
+    ),
     "unit of a piece": (
         "length_mm",
         "length_m",

@@ -35,7 +35,19 @@ width_direction = [0.0, 1.0, 0.0]
 kind = "bending"
 length_mm = 25.0
 """
-COMMANDS = ("design", "shape", "workspace", "mesh", "solve", "report", "fit-material", "run", "doctor")
+COMMANDS = (
+    "design",
+    "shape",
+    "workspace",
+    "mesh",
+    "solve",
+    "report",
+    "view",
+    "compare",
+    "fit-material",
+    "run",
+    "doctor",
+)
 
 
 def pneunet(*arguments, cwd):

@@ -62,7 +62,7 @@ def test_inverse_design_writes_and_prints_nothing(curve, monkeypatch, capsys, tm
     design = pn.inverse_design(np.loadtxt(curve, delimiter=",", skiprows=1), law=ToyLaw())
     assert not list(empty.iterdir()) and capsys.readouterr() == ("", "")
     assert design.errors.rms < 1.5 and design.doubts == () and isinstance(design.active_bounds, tuple)
-    assert re.fullmatch(r"<Design target: 2 segments, .* kPa; RMS .* mm \(.* %\); 0 doubts>", repr(design))
+    assert re.fullmatch(r"<Design target: 1 segments, .* kPa; RMS .* mm \(.* %\); 0 doubts>", repr(design))
     assert "target" in design.plot().axes[0].get_legend_handles_labels()[1]
 
 

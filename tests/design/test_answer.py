@@ -1,0 +1,99 @@
+"""What a design says of itself: casting grid, shapes at several pressures, tolerances, followed or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pneunet.cli import NOT_FOLLOWED, main
+from pneunet.design.inverse_design import answer, inverse_design
+from pneunet.design.search.inverse import search
+from pneunet.design.target.casting import Casting
+from pneunet.design.target.extraction import extract
+from pneunet.design.target.shapes import TargetShape
+from pneunet.design.target.target import Target
+from pneunet.geometry.designfile import read_design_file
+from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.reduced import predict
+from pneunet.reduced.analytic.clearance import gap_left
+from tests.design.test_inverse import BASE, made
+from tests.design.toy_law import ToyLaw
+
+PAIR = (
+    Segment("one-sided", 90.0, 7, base_thickness=2.4),
+    Segment("one-sided", 60.0, 9, chamber_height=4.4, base_thickness=1.6),
+)
+
+
+def test_dimensions_land_on_the_grid_with_a_flush_underside():
+    line, pieces = made(PAIR)
+    target = Target(line.points, pieces=pieces, **BASE)
+    found = search(target, extract(target, pieces), ToyLaw())
+    a, b = found.best.manipulator.segments
+    for segment in (a, b):
+        sizes = np.array([segment.chamber_height, segment.gap, segment.wall, segment.end_margin])
+        assert np.allclose(sizes / 0.05, np.round(sizes / 0.05)) and segment.angle % 0.5 == 0
+    assert a.base_thickness == b.base_thickness and found.flush_costs >= 0
+    stepped = replace(target, casting=Casting(allow_steps=True))
+    a, b = search(stepped, extract(stepped, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
+    assert a.base_thickness != b.base_thickness
+    assert len(found.alternatives) and all(c.differs(found.best) for c in found.alternatives)
+    assert all(c.rms >= 0.9 * found.best.rms for c in found.alternatives)
+
+
+def test_walls_and_touching_are_the_casters_to_allow():
+    line, pieces = made(PAIR, 0.05)
+    target = Target(line.points, pieces=pieces, pressure_range=(0.05, 0.05), **BASE)
+    target = replace(target, casting=Casting(walls=(0.6, 0.7), allow_touch=False))
+    kept = search(target, extract(target, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
+    assert all(0.6 <= s.wall <= 0.7 and gap_left(s, 0.05) > -0.05 for s in kept)
+    allowed = replace(target, casting=Casting(walls=(0.6, 0.7), allow_touch=True))
+    touching = search(allowed, extract(allowed, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
+    assert any(gap_left(s, 0.05) < -0.05 for s in touching)
+
+
+def test_one_body_meets_two_shapes_at_their_pressures():
+    body = Manipulator(PAIR)
+    high, pieces = made(PAIR, 0.04)
+    low = predict(body, 0.02, ToyLaw(), 0.5)
+    shape = TargetShape(low.points, (0.02,))
+    target = Target(high.points, pieces=pieces, pressure_range=(0.04, 0.04), shapes=(shape,), **BASE)
+    design = inverse_design(target, law=ToyLaw())
+    assert design.errors.rms < 0.005 * design.errors.reference_length
+    assert design.further_errors[0].rms < 0.005 * design.errors.reference_length
+    assert design.content.result["shape_error"][0]["rms_mm"] == design.further_errors[0].rms
+
+
+def test_tolerances_are_what_small_changes_do():
+    line, pieces = made(PAIR)
+    design = inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())
+    effects = {(e.name, e.segment): e for e in design.tolerances.effects}
+    one = design.manipulator.segments[0]
+    thicker = Manipulator(
+        (replace(one, base_thickness=one.base_thickness + 1e-3), *design.manipulator.segments[1:])
+    )
+    moved = predict(thicker, design.content.pressure, ToyLaw(), base_pose=design.content.base_pose)
+    away = np.linalg.norm(moved.points[-1] - design.prediction.points[-1])
+    assert effects["base_thickness_mm", 1].tip == pytest.approx(100 * away, rel=0.02)
+    told = Casting()
+    expected = 0.0
+    for e in effects.values():
+        scale = {"angle_deg": told.angle_tolerance, "mu_MPa": told.modulus_tolerance / 0.01}
+        scale["pressure_kPa"] = 1e3 * told.pressure_tolerance
+        expected += (e.tip * scale.get(e.name, told.tolerance / 0.1)) ** 2
+    assert design.tolerances.tip == pytest.approx(np.sqrt(expected), rel=1e-6)
+
+
+def test_an_answer_in_plain_words(tmp_path, capsys):
+    t = np.linspace(0, 1, 80)
+    tight = np.column_stack([8 * np.sin(12 * t), 0 * t, 8 * np.cos(12 * t)])  # 125 1/m: nothing bends so much
+    tight[:, 1] = 60 * t
+    np.savetxt(tmp_path / "coil.csv", tight, "%.4f", ",", header="x_mm,y_mm,z_mm", comments="")
+    assert main(["design", str(tmp_path / "coil.csv"), "-o", str(tmp_path / "out")]) == NOT_FOLLOWED
+    result = read_design_file(tmp_path / "out" / "design.toml").result
+    assert "NOT followed: " in capsys.readouterr().out
+    assert not result["followed"] and result["tolerances"]["casting_rms_mm"] > 0
+    line, pieces = made(PAIR)
+    last = list(answer(inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())))
+    assert last[0].startswith("followed: RMS") and "law 'toy' does not know" in last[1]
+    assert last[2].startswith("ASSUMED silicone: paper, twisting theory, mu = 0.317 MPa")
