@@ -75,7 +75,8 @@ def run_view(
 def framed(directory: Path) -> str:
     """HTML that shows the page in a frame of another one in the same folder, or says how to make it."""
     if not (directory / PAGE).exists():
-        return f'<p class="missing">To turn the body in a browser: pneunet view {escape(directory.resolve().name)}</p>'
+        name = escape(directory.resolve().name)
+        return f'<p class="missing">To turn the body in a browser: pneunet view {name}</p>'
     return (
         f'<p><a href="{PAGE}">On a page of its own</a>, which lies beside this one.</p><iframe src="{PAGE}"'
         ' title="the body, to turn" loading="lazy" style="width:100%;height:820px;border:1px solid #e4e8ec">'
