@@ -1,6 +1,5 @@
 """`pneunet report`: one self-contained page that shows what was asked, designed, predicted and proven."""
 
-import base64
 import logging
 from dataclasses import replace
 from html import escape
@@ -26,48 +25,13 @@ from pneunet.design.report.comparison import (
 )
 from pneunet.design.report.drawing import draw_drawing, segment_table
 from pneunet.design.report.labels import kPa, plain, segment_name, signed, significant
+from pneunet.design.report.page import STYLE, folded, grid, image, missing, table
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.report.viewing import framed
 from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.laws import SegmentLaw
 
 log = logging.getLogger(__name__)
-STYLE = """
-:root { color-scheme: light; }
-body {
-  font: 16px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: #1b1f24; background: #fff;
-  margin: 0 auto; max-width: 1080px; padding: 1rem;
-}
-h1 { font-size: 1.7rem; margin: .5rem 0; }
-h2 { font-size: 1.2rem; border-bottom: 2px solid #dee2e6; margin-top: 2.2rem; padding-bottom: .2rem; }
-.verdict { font-size: 1.1rem; border-left: 5px solid #1f6fb2; background: #eef5fb; padding: .7rem 1rem; }
-.alarm {
-  border-left: 5px solid #c92a2a; background: #fff0f0; color: #861c1c; padding: .7rem 1rem; font-weight: 600;
-}
-.note { border-left: 5px solid #f08c00; background: #fff8eb; padding: .5rem 1rem; margin: .6rem 0; }
-summary { cursor: pointer; padding: .3rem 0; }
-.missing { color: #6b747d; font-style: italic; }
-.table { overflow-x: auto; margin: .8rem 0; }
-table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e8ec; white-space: nowrap; }
-th { background: #f1f3f5; }
-th:first-child, td:first-child { text-align: left; }
-tr.head td { font-weight: 600; background: #f8f9fa; }
-td.long { white-space: normal; text-align: left; word-break: break-word; }
-.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(290px, 1fr)); gap: .8rem; }
-figure { margin: .8rem 0; }
-.grid figure { margin: 0; }
-img { width: 100%; height: auto; border: 1px solid #e4e8ec; }
-figcaption { font-size: .85rem; color: #4b545c; }
-footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
-@media print {
-  body { max-width: none; font-size: 11pt; padding: 0; }
-  figure, tr, .verdict, .alarm { break-inside: avoid; }
-  h2 { break-after: avoid; }
-  .grid { grid-template-columns: repeat(3, 1fr); }
-  .table { overflow: visible; }
-}
-"""
 
 
 def write_report(directory: str | Path, law: SegmentLaw | None = None) -> Path:
@@ -131,41 +95,6 @@ def _with_sound_fields(run):
         return replace(run, solve=replace(run.solve, solution=None), damaged=(*run.damaged, told))
 
 
-def _image(folder, name, caption):
-    data = base64.b64encode((Path(folder) / name).read_bytes()).decode()
-    told = escape(caption)
-    return (
-        f'<figure><img alt="{told}"'
-        f' src="data:image/png;base64,{data}"><figcaption>{told}</figcaption></figure>'
-    )
-
-
-def _grid(folder, pictures):
-    return f'<div class="grid">{"".join(_image(folder, *p) for p in pictures)}</div>'
-
-
-def _table(header, rows):
-    """HTML table; a row that is a string becomes a heading inside the table."""
-    lines = "".join(f"<th>{escape(h)}</th>" for h in header)
-    out = f"<tr>{lines}</tr>"
-    for row in rows:
-        if isinstance(row, str):
-            out += f'<tr class="head"><td colspan="{len(header)}">{escape(row)}</td></tr>'
-        else:
-            out += (
-                "<tr>"
-                + "".join(
-                    f"<td{' class=long' if len(str(c)) > 40 else ''}>{escape(str(c))}</td>" for c in row
-                )
-                + "</tr>"
-            )
-    return f'<div class="table"><table>{out}</table></div>'
-
-
-def _missing(text):
-    return f'<p class="missing">{escape(text)}</p>'
-
-
 def _headline(run, comparison):
     design, m = run.design, run.design.manipulator
     c = comparison
@@ -206,9 +135,9 @@ def _alarms(run):
 def _shapes(run, comparison, scene, folder):
     out = ""
     if run.solve is None:
-        out += _missing("There is no finite element solution in this folder yet (pneunet solve).")
+        out += missing("There is no finite element solution in this folder yet (pneunet solve).")
     elif run.solve.solution is None:
-        out += _missing("The finite element fields (solve/solution.pvd) are not in this folder.")
+        out += missing("The finite element fields (solve/solution.pvd) are not in this folder.")
     curves = figures.curve_picture(run, comparison, folder)
     bodies = figures.body_pictures(run, scene, folder)
     fields = [b for b in bodies if b[0] in ("fe_displacement.png", "fe_stretch.png", "reference.png")]
@@ -216,9 +145,9 @@ def _shapes(run, comparison, scene, folder):
     return (
         out
         + "<p>Same camera and scale for all pictures but the body at rest.</p>"
-        + _grid(folder, beside)
-        + "".join(_image(folder, *c) for c in curves)
-        + _grid(folder, fields)
+        + grid(folder, beside)
+        + "".join(image(folder, *c) for c in curves)
+        + grid(folder, fields)
     )
 
 
@@ -232,7 +161,7 @@ def _errors(comparison, run):
     mark = " (overlaps: not proven)" * bool(overlaps(run))
     columns = [(name + mark * ("FE" in name), e) for name, e in columns if e is not None]
     if not columns:
-        return _missing("There are no two curves to compare.")
+        return missing("There are no two curves to compare.")
 
     def both(e, mm, told=significant):
         return f"{told(mm, 3)} mm ({told(e.percent(mm), 2)} %)"
@@ -247,16 +176,14 @@ def _errors(comparison, run):
         ["lengths"] + [f"{e.length:.2f} mm vs {e.reference_length:.2f} mm" for _, e in columns],
     ]
     return (
-        _table(["", *[name for name, _ in columns]], rows)
+        table(["", *[name for name, _ in columns]], rows)
         + "<p>% of the length of the second curve named.</p>"
     )
 
 
 def _strains(run, comparison):
     if run.solve is None:
-        return _missing(
-            "Segment strains are measured on the finite element solution, which is not there yet."
-        )
+        return missing("Segment strains are measured on the finite element solution, which is not there yet.")
     measured, predicted = run.solve.strains, comparison.strains
     quantities = [
         ("stretch |e|", lambda s: s.stretch, 1.0, 4),
@@ -277,7 +204,7 @@ def _strains(run, comparison):
             rows.append([label, told, _fixed(fe, digits), ratio])
     return (
         _alarms(run)
-        + _table([f"at {kPa(run.design.scaled(run.solve.pressure))}", "reduced", "FE", "FE / reduced"], rows)
+        + table([f"at {kPa(run.design.scaled(run.solve.pressure))}", "reduced", "FE", "FE / reduced"], rows)
         + "<p>Strains refer to the section frame on the channel axis; |k| and k.e of a uniform screw do not"
         " depend on that choice.</p>"
     )
@@ -290,13 +217,13 @@ def _fixed(value, digits):
 
 def _history(run, law, folder):
     if run.solve is None:
-        return _missing("No finite element solution yet.")
-    return "".join(_image(folder, *p) for p in figures.history_picture(run.design, run.solve, law, folder))
+        return missing("No finite element solution yet.")
+    return "".join(image(folder, *p) for p in figures.history_picture(run.design, run.solve, law, folder))
 
 
 def _walls(run, scene, folder):
     if run.solve is None:
-        return _missing("No wall distances: there is no finite element solution yet.")
+        return missing("No wall distances: there is no finite element solution yet.")
     solve = run.solve
     distances = [d for *_, d in solve.walls]
     out, touching = _alarms(run), sum(d < 0 for d in distances)
@@ -313,9 +240,9 @@ def _walls(run, scene, folder):
             f" {far:.2f} mm. Contact between such parts is not modelled.</p>"
         )
     if not distances:
-        return out + _missing("No wall distances: the body has no gaps.")
-    out += _grid(folder, figures.touching_picture(run.design, solve, scene, folder))
-    out += "".join(_image(folder, *p) for p in figures.wall_picture(run.design.manipulator, solve, folder))
+        return out + missing("No wall distances: the body has no gaps.")
+    out += grid(folder, figures.touching_picture(run.design, solve, scene, folder))
+    out += "".join(image(folder, *p) for p in figures.wall_picture(run.design.manipulator, solve, folder))
     rows = []
     for key in sorted({(a, b) for a, b, _, _ in solve.walls}, key=lambda k: (k[0], -k[1])):
         here = [(d, gap) for a, b, gap, d in solve.walls if (a, b) == key]
@@ -331,23 +258,23 @@ def _walls(run, scene, folder):
                 "open" if distance >= 0 else "in contact" if solve.contact else "OVERLAP",
             ]
         )
-    return out + _table(
+    return out + table(
         ["segment, side", "gaps", "gap at rest, mm", "smallest distance, mm", "in gap", ""], rows
     )
 
 
 def _drawing(run, folder):
     rows = segment_table(run.design.manipulator)
-    table = _table(
+    dimensions = table(
         ["segment", *[str(i + 1) for i in range(len(rows[0][1]))]],
         [[label, *values] for label, values in rows],
     )
     materials = {m.name: m for m in run.design.manipulator.materials}.values()
-    told = _table(
+    told = table(
         ["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],
         [[m.name, m.law, plain(m.mu, 4), plain(m.density * 1e12), m.source or "-"] for m in materials],
     )
-    return _image(folder, "drawing.png", "All dimensions in mm.") + table + told
+    return image(folder, "drawing.png", "All dimensions in mm.") + dimensions + told
 
 
 def _flat(record, prefix=""):
@@ -380,17 +307,13 @@ def _computed(run):
             ["walls overlap", "yes" if solve.walls_overlap else "no"],
             ["far parts of the body overlap", "yes" if solve.body_overlap else "no"],
         ]
-        out += _table(["finite element solution", ""], rows)
+        out += table(["finite element solution", ""], rows)
     records = [
         ("design (run.json)", run.record),
         ("mesh (mesh/mesh.json)", run.mesh),
         ("finite elements (solve/run.json)", run.solve.record if run.solve else {}),
     ]
     for title, record in records:
-        told = _table([title, ""], _flat(record))
-        out += _folded(f"Record of the {title}", told) if record else _missing(f"No record of the {title}.")
+        told = table([title, ""], _flat(record))
+        out += folded(f"Record of the {title}", told) if record else missing(f"No record of the {title}.")
     return out
-
-
-def _folded(title, content):
-    return f"<details><summary>{escape(title)}</summary>{content}</details>"

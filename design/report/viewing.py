@@ -3,7 +3,6 @@
 import logging
 import os
 import sys
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +74,7 @@ def run_view(
 def framed(directory: Path) -> str:
     """HTML that shows the page in a frame of another one in the same folder, or says how to make it."""
     if not (directory / PAGE).exists():
-        return f'<p class="missing">To turn the body in a browser: pneunet view {escape(str(directory))}</p>'
+        return '<p class="missing">To turn the body in a browser: pneunet view, with this folder.</p>'
     return (
         f'<p><a href="{PAGE}">On a page of its own</a>, which lies beside this one.</p><iframe src="{PAGE}"'
         ' title="the body, to turn" loading="lazy" style="width:100%;height:820px;border:1px solid #e4e8ec">'

@@ -10,7 +10,7 @@ from typing import Any
 from pneunet.base.files.atomic import atomic_path, write_text
 from pneunet.base.files.record import revision
 from pneunet.design.report.drawing import drawing_figure
-from pneunet.design.report.report import STYLE
+from pneunet.design.report.page import STYLE
 from pneunet.design.workshop.sheet import Block, Picture, SheetTable, Steps
 from pneunet.geometry.designfile import DesignFile
 
