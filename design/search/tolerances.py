@@ -93,8 +93,7 @@ def tolerances(body: Body, shape: Shape, casting: Casting, law: SegmentLaw) -> T
         moves = by_pressure[:, :, members].sum(axis=2)
         name = "pressure_kPa" if len(groups) == 1 else f"pressure_{group}_kPa"
         add(name, None, "1 kPa", moves, PER_PRESSURE * MPA_PER_KPA, casting.pressure_tolerance)
-    # strains depend on the pressure over the modulus
-    moves = -by_pressure @ body.pressures[0]
+    moves = shape.moves[:, :, :, FIELD_AT["mu"]] @ [s.material.mu for s in body.segments]
     add("mu_MPa", None, "1 %", moves, PER_MODULUS, casting.modulus_tolerance)
     rms, tip = np.sqrt(variances)
     return Tolerances(tuple(effects), float(rms), float(tip), *_of_the_law(body, shape, law))

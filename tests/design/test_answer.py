@@ -77,6 +77,13 @@ def test_tolerances_are_what_small_changes_do():
     moved = predict(thicker, design.content.pressure, ToyLaw(), base_pose=design.content.base_pose)
     away = np.linalg.norm(moved.points[-1] - design.prediction.points[-1])
     assert effects["base_thickness_mm", 1].tip == pytest.approx(100 * away, rel=0.02)
+    soft = of_modulus(PAPER_TWISTING, 0.999 * PAPER_TWISTING.mu)
+    softer = tuple(replace(s, material=soft) for s in design.manipulator.segments)
+    moved = predict(
+        Manipulator(softer), design.content.pressure, ToyLaw(), base_pose=design.content.base_pose
+    )
+    away = np.linalg.norm(moved.points[-1] - design.prediction.points[-1])
+    assert effects["mu_MPa", None].tip == pytest.approx(10 * away, rel=0.02)
     told = Casting()
     expected = 0.0
     for e in effects.values():
