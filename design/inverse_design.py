@@ -37,6 +37,8 @@ RATES = {
     "cylinder_curvature_per_m": ("cylinder curvature", "1/m"),
     "pitch_mm": ("pitch", "mm"),
 }
+#: of the design's pressure: less is what the casting grid leaves of a limit, not a limit that is exceeded
+ROUNDED = 0.98
 #: of a terminal
 COLUMNS = 100
 #: dimensions that are named as those that move the shape most
@@ -106,7 +108,7 @@ def inverse_design(
             "alternative": [_table(c) for c in found.alternatives],
             "piece": [
                 {**piece.table(), "predicted": predicted(piece.kind, RodStrains(e, k))}
-                for piece, e, k in zip(asked.pieces, design.strains.e, design.strains.k)
+                for piece, e, k in zip(found.pieces, design.strains.e, design.strains.k)
             ],
         }
     )
@@ -216,7 +218,7 @@ def _pressure_limits(content, law):
     from pneunet.design.workshop.limits import limits
 
     for limit in limits(content, law):
-        exceeded = " (EXCEEDED)" * (limit.pressure < content.largest_pressure)
+        exceeded = " (EXCEEDED)" * (limit.pressure < ROUNDED * content.largest_pressure)
         yield f"{kPa(limit.pressure)}{exceeded}: {limit.reason}"
 
 

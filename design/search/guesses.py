@@ -56,11 +56,6 @@ def _guesses_at(target, pieces, prototypes, law):
         heights.append(grid(varying.get("chamber_height"), segment.chamber_height, 1.0))
     body = Manipulator(tuple(prototypes))
     if len(target.pressures) > 1:
-        if len(body.groups) == 1:
-            raise InputError(
-                "pressure_kPa: several pressures need as many groups of segments: write pressure_group = 1,"
-                " 2, ... in the [[piece]] tables"
-            )
         fixed = body.pressures(target.pressures)[None]
         return first_guesses(pieces, prototypes, angles, heights, fixed, law)
     low, high = target.pressure_range or (0.010, PRESSURE_LIMIT)

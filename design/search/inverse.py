@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.materials.laws import of_modulus
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
+from pneunet.design.search.groups import divided
 from pneunet.design.search.guesses import guesses, start
 from pneunet.design.search.problem import Evaluation, Problem
 from pneunet.design.search.whole import STEPS, TRIED, on_grid, optimised, with_whole_chambers
@@ -75,9 +77,9 @@ class Candidate:
         return float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
 
     def differs(self, other: "Candidate") -> bool:
-        """Whether another one has another silicone, other numbers of chambers or clearly other angles."""
+        """Whether another one has other silicone, groups or numbers of chambers, or clearly other angles."""
         pairs = list(zip(self.manipulator.segments, other.manipulator.segments))
-        if any(a.material.name != b.material.name for a, b in pairs):
+        if any((a.material.name, a.group) != (b.material.name, b.group) for a, b in pairs):
             return True
         return any(a.chambers != b.chambers or abs(a.angle - b.angle) >= DISTINCT for a, b in pairs)
 
@@ -86,7 +88,7 @@ class Candidate:
 class Found:
     """best: the design. alternatives: distinct ones, best first. active: bounds that the optimum sits on, and
     what they cost; stopped_by: the one that costs most, "" where none costs anything. flush_costs: mm by
-    which steps in the underside would lower the misfit."""
+    which steps in the underside would lower the misfit. pieces: with the groups that were chosen."""
 
     best: Candidate
     alternatives: tuple[Candidate, ...]
@@ -94,6 +96,7 @@ class Found:
     stopped_by: str
     flush_costs: float
     evaluations: int
+    pieces: tuple[Extracted, ...]
 
 
 def search(
@@ -113,21 +116,24 @@ def search(
     if objective not in OBJECTIVES:
         raise InputError(f"objective = '{objective}' is not known: write {' or '.join(OBJECTIVES)}")
     tried, failed = [], None
-    for material in target.materials:
+    divisions = divided(target, pieces)
+    for material, parts in product(target.materials, divisions):
+        if len(target.materials) > 1:
+            log.info(f"silicone {material.name}:")
+        if len(divisions) > 1:
+            log.info(f"pressure groups of the pieces: {', '.join(str(p.group) for p in parts)}")
         of_it = replace(target, material=_within(material, target.casting.moduli))
         try:
-            one = _Search(of_it, tuple(pieces), law, objective, alternatives, mapping)
+            tried.append(_Search(of_it, parts, law, objective, alternatives, mapping))
         except ConvergenceError as error:
             failed = error
-            continue
-        tried.append(one)
-        if len(target.materials) > 1:
-            log.info(f"silicone {material.name}: {one.best}")
     if not tried:
         assert failed is not None
         raise failed
     chosen = min(tried, key=lambda one: one.best.rms)
-    return chosen.found([one.best for one in tried if one is not chosen])
+    others = [one for one in tried if one is not chosen]
+    chosen.evaluations += sum(one.evaluations for one in others)
+    return chosen.found([one.best for one in others])
 
 
 def _within(material, moduli):
@@ -144,7 +150,8 @@ def _angles(segments):
 
 
 class _Search:
-    """The way from guesses to the best body of one silicone, and on to a Found; counts evaluations."""
+    """The way from guesses to the best body of one silicone and division into pressure groups, and on to a
+    Found; counts evaluations."""
 
     def __init__(self, target, pieces, law, objective, most, mapping):
         self.mapping = mapping
@@ -164,18 +171,24 @@ class _Search:
         self.best = self._cast(self.whole)
         log.info(f"dimensions on grid:  {self.best}")
 
-    def found(self, of_other_silicones):
-        """The Found, with the best Candidates of other silicones among the alternatives."""
+    def found(self, rivals):
+        """The Found, with the best Candidates of other searches among the alternatives."""
         best, whole = self.best, self.whole
         flush = self._flush_costs(*self.real)
         bounds = sorted(_active(*whole), key=lambda pair: -pair[0])
         stopped = bounds[0][1] if bounds and bounds[0][0] > 0 else ""
-        alternatives = self._alternatives(best, whole, self.guesses, of_other_silicones)
+        alternatives = self._alternatives(best, whole, self.guesses, rivals)
         if alternatives and alternatives[0].rms < BETTER * best.rms:
             best, alternatives = alternatives[0], (best, *alternatives[1:])
         touching = () if self.target.casting.allow_touch else _touching(best)
         return Found(
-            best, alternatives, (*(text for _, text in bounds), *touching), stopped, flush, self.evaluations
+            best,
+            alternatives,
+            (*(text for _, text in bounds), *touching),
+            stopped,
+            flush,
+            self.evaluations,
+            self.pieces,
         )
 
     def _counted(self, found):
@@ -253,10 +266,10 @@ class _Search:
         pressures = body.pressures[:, [group[0] for group in whole.groups]]
         return Candidate(whole, pressures, body.base_pose, rms, problem, at)
 
-    def _alternatives(self, best, whole, guesses, of_other_silicones):
+    def _alternatives(self, best, whole, guesses, rivals):
         """Distinct Candidates that are not much worse."""
         allowed = max(2 * best.rms, 5 * GOOD_ENOUGH * self.target.length)
-        found = [c for c in of_other_silicones if c.rms <= allowed]
+        found = [c for c in rivals if c.rms <= allowed]
         found = sorted(found, key=lambda c: c.rms)[: self.most]
         if len(found) == self.most:
             return tuple(found)

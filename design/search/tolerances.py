@@ -91,7 +91,7 @@ def tolerances(body: Body, shape: Shape, casting: Casting, law: SegmentLaw) -> T
     for group in groups:
         members = [i for i, segment in enumerate(body.segments) if segment.group == group]
         moves = by_pressure[:, :, members].sum(axis=2)
-        name = "pressure_kPa" if len(groups) == 1 else f"pressure_{group}_kPa"
+        name = "pressure_kPa" if len(groups) == 1 else f"pressure_group_{group}_kPa"
         add(name, None, "1 kPa", moves, PER_PRESSURE * MPA_PER_KPA, casting.pressure_tolerance)
     moves = shape.moves[:, :, :, FIELD_AT["mu"]] @ [s.material.mu for s in body.segments]
     add("mu_MPa", None, "1 %", moves, PER_MODULUS, casting.modulus_tolerance)

@@ -72,8 +72,8 @@ def _target(where, **values):
 CURVES = ("points", "points_mm", "wrap")
 SHAPE_KEYS = (*CURVES, "frames", "weights", "pressure_kPa")
 KEYS = (
-    *("name", "target", *SHAPE_KEYS, "pressure_range_kPa", "gravity_m_per_s2", "shape", "tip_points"),
-    *("piece", "base", "material", "casting", "segment", "split", "vary"),
+    *("name", "target", *SHAPE_KEYS, "pressure_range_kPa", "pressure_groups", "gravity_m_per_s2"),
+    *("shape", "tip_points", "piece", "base", "material", "casting", "segment", "split", "vary"),
 )
 
 
@@ -113,6 +113,7 @@ def _from_toml(path):
         base_width=width,
         pressure_range=pressure_range,
         pressures=pressures,
+        groups=_groups(table, where),
         gravity=_gravity(table, where),
         shapes=tuple(_shape(row, folder, f"{where} [[shape]] {i}") for i, row in enumerate(shapes, start=1)),
         tip=tip,
@@ -285,6 +286,14 @@ def _pressure(table, where):
     if key == "pressure_kPa" and len(pressures) > 1:
         return None, pressures
     return (pressures[0], pressures[-1]), ()
+
+
+def _groups(table, where):
+    count = table.get("pressure_groups", 1)
+    if type(count) is not int or not 1 <= count <= MOST_GROUPS:
+        told = f"pressure_groups = {shown(count)}"
+        raise InputError(f"{where}: {told} must be a whole number, 1..{MOST_GROUPS}")
+    return count
 
 
 def _range(value, key, where):

@@ -62,7 +62,8 @@ class Target:
     its roll stays free, both None = it is free to turn); gravity (3,): acceleration in mm/s2, in the target's
     coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of several groups of
     segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip: `TipPoints` as the
-    pressure rises; material; casting: what can be cast; start: {field of Segment: mm}; vary: {field of
+    pressure rises; material; casting: what can be cast; groups: how many pressures
+    there are, where pieces do not say; start: {field of Segment: mm}; vary: {field of
     Segment: (low, high)} or None for the default choice; split: how it is split; source: name of the file
     that it was read from.
     """
@@ -85,6 +86,7 @@ class Target:
     shapes: tuple[TargetShape, ...] = ()
     tip: TipPoints | None = None
     casting: Casting = Casting()
+    groups: int = 1
 
     @classmethod
     def read(cls, path: str | Path) -> "Target":

@@ -9,9 +9,10 @@ from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
 from pneunet.cli import NOT_FOLLOWED, main
 from pneunet.design.inverse_design import answer, inverse_design, summary, wrapped
+from pneunet.design.search.groups import divided
 from pneunet.design.search.inverse import search
 from pneunet.design.target.casting import Casting
-from pneunet.design.target.extraction import extract
+from pneunet.design.target.extraction import Extracted, extract
 from pneunet.design.target.shapes import TargetShape
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import read_design_file
@@ -156,14 +157,21 @@ def test_each_group_of_segments_has_a_pressure_of_its_own(tmp_path):
     # the dimensions are known: only pressures make up for it
     target = Target(line.points, pieces=pieces, vary={}, start={"base_thickness": 2.4}, **BASE)
     target = replace(target, shapes=(TargetShape(low.points, (0.02, 0.03)),))
-    free = inverse_design(target, law=ToyLaw())
+    # which segments share one is found where nobody says
+    unsaid = replace(target, pieces=tuple(replace(p, group=1) for p in pieces), groups=2)
+    free = inverse_design(unsaid, law=ToyLaw())
     assert free.content.pressure == pytest.approx((0.045, 0.02), rel=0.01)
     fixed = inverse_design(replace(target, pressures=(0.045, 0.02)), law=ToyLaw())
     for design in (free, fixed):
         assert design.errors.rms < 0.3 and design.further_errors[0].rms < 0.3
     assert fixed.content.pressure == (0.045, 0.02)
-    assert [e.name for e in free.tolerances.effects][-3:] == ["pressure_1_kPa", "pressure_2_kPa", "mu_MPa"]
+    names = [e.name for e in free.tolerances.effects][-3:]
+    assert names == ["pressure_group_1_kPa", "pressure_group_2_kPa", "mu_MPa"]
     folder = free.save(tmp_path / "out")
     assert [p.group for p in Target.read(folder / "split.toml").pieces] == [1, 2]
-    with pytest.raises(InputError, match="pressure_kPa: several pressures need as many groups"):
-        inverse_design(Target(line.points, pieces=made(PAIR)[1], pressures=(0.03, 0.02)), law=ToyLaw())
+    with pytest.raises(InputError, match="3 pressures need as many pieces that bend or twist, not 2"):
+        inverse_design(replace(unsaid, pressures=(0.03, 0.02, 0.01)), law=ToyLaw())
+    five = [Extracted("bending", 30.0, 0.0, 0.01, 0.0)] * 2 + [Extracted("passive", 9.0, 0.0, 0.0, 0.0)]
+    found = divided(replace(unsaid, groups=2), five + five[:1] * 2)
+    groups = [[p.group for p in parts] for parts in found]
+    assert groups == [[1, 2, 2, 2, 2], [1, 1, 1, 2, 2], [1, 1, 1, 1, 2]]
