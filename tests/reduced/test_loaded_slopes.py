@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pneunet.base import se3
+from pneunet.base.materials.laws import of_modulus
 from pneunet.geometry.parameters import Segment
 from pneunet.reduced import shipped_law
 from pneunet.reduced.rod import loaded_slopes
@@ -18,7 +19,7 @@ SEGMENTS = (Segment("one-sided", 70.0, 1, roll=180), Segment("one-sided", 90.0, 
 COUNTS, PRESSURES = np.array([9.3, 0.0]), np.array([0.03, 0.03])
 BASE = se3.exp_pose(np.array([0.1, -0.2, 0.3, 1.0, 2.0, 3.0]))
 TIP = np.array([1.0])
-STEPS = {"pressure": 2e-5, "chambers": 1e-3, "angle": 1e-2, "wall": 1e-3, "end_margin": 1e-3}
+STEPS = {"pressure": 2e-5, "chambers": 1e-3, "angle": 1e-2, "wall": 1e-3, "end_margin": 1e-3, "mu": 2e-4}
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +46,9 @@ def test_a_hanging_rod_answers_as_differences_say():
             return tip(pressures=PRESSURES + [step, 0])
         if name == "chambers":
             return tip(counts=COUNTS + [step, 0])
+        if name == "mu":
+            material = of_modulus(SEGMENTS[0].material, SEGMENTS[0].material.mu + step)
+            return tip(segments=(replace(SEGMENTS[0], material=material), SEGMENTS[1]))
         one = replace(SEGMENTS[0], **{name: getattr(SEGMENTS[0], name) + step})
         return tip(segments=(one, SEGMENTS[1]))
 
