@@ -117,9 +117,24 @@ class MeasuredComparison:
         return float(np.mean((self.errors <= self.bars)[self.loaded][seen]))
 
     @property
+    def told(self) -> int:
+        """The point whose way is told and drawn: the tip, or the marker that should go farthest."""
+        if TIP in self.measured.names:
+            return self.measured.names.index(TIP)
+        predicted = self.predicted.plain
+        if not self.measured.names:
+            return predicted.shape[1] - 1
+        return int(np.argmax(np.linalg.norm(predicted[-1] - predicted[0], axis=1)))
+
+    @property
     def way(self) -> np.ndarray:
-        """(n,) mm, how far the last point measured has gone from where it was at the first level."""
-        values = self.aligned.values[:, -1]
+        """(n,) mm, how far that point has gone from where it was at the first level."""
+        return self.ways(self.aligned.values)
+
+    def ways(self, values: np.ndarray) -> np.ndarray:
+        """(n,) of values (n, k, d) as measured or predicted: how far the point `told` has gone, or the
+        value itself."""
+        values = values[:, self.told]
         return np.linalg.norm(values - values[0], axis=1) if values.shape[1] == 3 else values[:, 0]
 
     @property
@@ -335,7 +350,7 @@ def compare(
 
 def _solved(run: Path, measured: Measurement) -> tuple[np.ndarray, np.ndarray] | None:
     """MeasuredComparison.solved; None where there are no finite elements, or the tip was not measured."""
-    at_tip = measured.what in (CENTRELINE, DISPLACEMENT) or measured.names[-1:] == (TIP,)
+    at_tip = measured.what in (CENTRELINE, DISPLACEMENT) or TIP in measured.names
     folder = run if run.is_dir() else run.parent
     if not at_tip or not (folder / "solve").is_dir():
         return None
@@ -385,5 +400,6 @@ def run_compare(
     folder = found.save(base / "compare" if directory is None else directory)
     for line in found.lines():
         log.info(line)
-    log.info(f"written: {folder}/compare.csv, run.json" + ", fitted.toml" * (found.fit is not None))
+    more = ", compare.png" * (folder / "compare.png").exists() + ", fitted.toml" * (found.fit is not None)
+    log.info(f"written: {folder}/compare.csv, run.json{more}")
     return found

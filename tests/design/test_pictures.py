@@ -160,6 +160,21 @@ def test_curves_in_3d_fill_their_place(size):
     assert 0.6 * FILLED < seen.max() < FILLED
 
 
+def test_a_design_of_many_segments_is_named_without_overlap():
+    pytest.importorskip("matplotlib")
+    from pneunet.design.design import Design
+    from pneunet.design.report.pictures import design_figure
+
+    design = Design.of(
+        Manipulator((HELIX, replace(HELIX, roll=180)) * 3), pressure_kPa=20, law=AnalyticLaw()
+    )
+    fig = design_figure(design.content, design.predict(20))
+    fig.draw_without_rendering()
+    boxes = [t.get_window_extent() for t in (*fig.texts, *fig.legends)] + [ax.bbox for ax in fig.axes[1:]]
+    assert len(fig.legends) == 2
+    assert not [(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)]
+
+
 def test_design_picture(tmp_path):
     pytest.importorskip("matplotlib")
     from pneunet.design.design import Design
