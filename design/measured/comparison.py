@@ -119,21 +119,14 @@ class MeasuredComparison:
     @property
     def told(self) -> int:
         """The point whose way is told and drawn: the tip, or the marker that should go farthest."""
-        if TIP in self.measured.names:
-            return self.measured.names.index(TIP)
-        predicted = self.predicted.plain
-        if not self.measured.names:
-            return predicted.shape[1] - 1
-        return int(np.argmax(np.linalg.norm(predicted[-1] - predicted[0], axis=1)))
+        names, predicted = self.measured.names, self.predicted.plain
+        if TIP in names:
+            return names.index(TIP)
+        return int(np.argmax(np.linalg.norm(predicted[-1] - predicted[0], axis=1))) if names else -1
 
-    @property
-    def way(self) -> np.ndarray:
-        """(n,) mm, how far that point has gone from where it was at the first level."""
-        return self.ways(self.aligned.values)
-
-    def ways(self, values: np.ndarray) -> np.ndarray:
-        """(n,) of values (n, k, d) as measured or predicted: how far the point `told` has gone, or the
-        value itself."""
+    def way(self, values: np.ndarray) -> np.ndarray:
+        """(n,) of values (n, k, d), measured or predicted: how far the point `told` has gone from where it
+        was at the first level, mm, or the value itself."""
         values = values[:, self.told]
         return np.linalg.norm(values - values[0], axis=1) if values.shape[1] == 3 else values[:, 0]
 
@@ -143,8 +136,9 @@ class MeasuredComparison:
         if self.solved is None:
             return None
         kPa, way = self.solved
-        within = (self.pressures_kPa <= 1.001 * kPa[-1]) & (np.arange(len(self.way)) >= self.loaded.start)
-        off = (self.way - np.interp(self.pressures_kPa, kPa, way))[within]
+        measured = self.way(self.aligned.values)
+        within = (self.pressures_kPa <= 1.001 * kPa[-1]) & (np.arange(len(measured)) >= self.loaded.start)
+        off = (measured - np.interp(self.pressures_kPa, kPa, way))[within]
         return float(np.sqrt(np.nanmean(off**2))) if len(off) else None
 
     @cached_property
@@ -400,6 +394,5 @@ def run_compare(
     folder = found.save(base / "compare" if directory is None else directory)
     for line in found.lines():
         log.info(line)
-    more = ", compare.png" * (folder / "compare.png").exists() + ", fitted.toml" * (found.fit is not None)
-    log.info(f"written: {folder}/compare.csv, run.json{more}")
+    log.info(f"written: {folder} with {', '.join(sorted(file.name for file in folder.iterdir()))}")
     return found

@@ -32,19 +32,29 @@ def comparison_figure(found: "MeasuredComparison") -> "Figure":
 
 
 def _over_pressure(ax, found):
-    kPa, told, predicted = found.pressures_kPa, found.told, found.ways(found.predicted.plain)
+    kPa, told, predicted = found.pressures_kPa, found.told, found.way(found.predicted.plain)
     half = found.predicted.half_width
     if half is not None:
         low, high = predicted - half[:, told], predicted + half[:, told]
-        ax.fill_between(kPa, low, high, color=REDUCED, alpha=0.2, linewidth=0, label="90 % interval of the prediction")
+        ax.fill_between(
+            kPa, low, high, color=REDUCED, alpha=0.2, linewidth=0, label="90 % interval of the prediction"
+        )
     ax.plot(kPa, predicted, color=REDUCED, label="predicted")
     if found.fitted is not None:
         label = f"modulus x {found.fit.change.modulus:.3f}"
-        ax.plot(kPa, found.ways(found.fitted), "--", color=FITTED, label=label)
+        ax.plot(kPa, found.way(found.fitted), "--", color=FITTED, label=label)
     if found.solved is not None:
         ax.plot(*found.solved, ":", color=FINITE_ELEMENTS, label="finite elements")
     spread = found.measured.spread[:, told]
-    ax.errorbar(kPa, found.way, np.nan_to_num(spread), fmt="o", color=TARGET, markersize=4, label="measured")
+    ax.errorbar(
+        kPa,
+        found.way(found.aligned.values),
+        np.nan_to_num(spread),
+        fmt="o",
+        color=TARGET,
+        markersize=4,
+        label="measured",
+    )
     name = found.measured.names[told] if found.measured.names else "tip"
     what = "angle" if found.measured.unit == "deg" else f"how far {name} has moved"
     ax.set(xlabel="pressure, kPa", ylabel=f"{what}, {found.measured.unit}")

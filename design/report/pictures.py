@@ -155,5 +155,11 @@ def design_figure(
     legend(fig, curves, body.segments)
     fig.text(0.025, 0.975, content.name, fontsize=15, weight="bold", va="top")
     told = f"{kPa(content.pressure)}, {body.chambers} chambers"
-    fig.text(0.025, 0.02, f"{told}, {plain(body.length, 1)} mm long at rest\n{caption}", fontsize=9, linespacing=1.5)
+    fig.text(
+        0.025,
+        0.02,
+        f"{told}, {plain(body.length, 1)} mm long at rest\n{caption}",
+        fontsize=9,
+        linespacing=1.5,
+    )
     return fig

@@ -179,9 +179,7 @@ def test_a_design_of_many_segments_is_named_without_overlap():
     from pneunet.design.design import Design
     from pneunet.design.report.pictures import design_figure
 
-    design = Design.of(
-        Manipulator((HELIX, replace(HELIX, roll=180)) * 3), pressure_kPa=20, law=AnalyticLaw()
-    )
+    design = Design.of(Manipulator((HELIX, replace(HELIX, roll=180)) * 3), pressure_kPa=20, law=AnalyticLaw())
     fig = design_figure(design.content, design.predict(20))
     fig.draw_without_rendering()
     boxes = [t.get_window_extent() for t in (*fig.texts, *fig.legends)] + [ax.bbox for ax in fig.axes[1:]]
