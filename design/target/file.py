@@ -1,8 +1,9 @@
-"""Reading a `Target` from a CSV of points or a TOML; docs/use-design.md shows the files.
+"""Reading a `Target` from a CSV of points or a TOML; docs/use-targets.md shows the files.
 
 Every bad input is one line that names the key and the fix.
 """
 
+import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,6 +31,8 @@ from pneunet.design.target.target import (
 )
 from pneunet.design.target.wrapfile import wrapped
 from pneunet.geometry.parameters import TWISTING, Segment
+
+log = logging.getLogger(__name__)
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
@@ -246,7 +249,12 @@ def _casting(table, where):
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise InputError(f"{where}: 'silicones' must be a list of names, not {shown(names)}")
     refuse_unknown(table, (*quantities(Casting), *RANGES, "silicones"), where)
-    return from_table(Casting, table, where, silicones=tuple(names), **given)
+    casting = from_table(Casting, table, where, silicones=tuple(names), **given)
+    if casting.silicones or casting.moduli is not None:
+        log.warning(
+            f"warning: {where}: the search does not choose a silicone yet: that of [material] is taken"
+        )
+    return casting
 
 
 def _array(value, key, where, dimensions):
