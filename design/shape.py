@@ -18,7 +18,7 @@ from pneunet.base.pictures.rendering import view_of
 from pneunet.base.pictures.vtp import write_quads
 from pneunet.base.units import in_MPa
 from pneunet.design.design import Design
-from pneunet.design.report.labels import plain, rgb, segment_colour
+from pneunet.design.report.labels import kPa, plain, rgb, segment_colour
 from pneunet.design.search.doubts import WARN, tell_doubts
 from pneunet.geometry.designfile import read_design_file
 from pneunet.reduced.choice import choose_law
@@ -98,7 +98,7 @@ def _write(folder, design_path, design, shapes, failed, doubted):
     log.info(f"centrelines at {_list(shapes)} kPa: {folder / 'centrelines.csv'}")
     for p, line in shapes.items():
         tip = ", ".join(f"{x:.1f}" for x in line.points[-1])
-        log.info(f"  {plain(p):>6} kPa: length {line.length:.1f} mm, tip at ({tip}) mm")
+        log.info(f"  {_each(design, p):>10}: length {line.length:.1f} mm, tip at ({tip}) mm")
     try:
         _pictures(design, list(shapes), folder)
     except ImportError as error:
@@ -118,6 +118,11 @@ def _write(folder, design_path, design, shapes, failed, doubted):
         )
 
 
+def _each(design, pressure):
+    """'20 kPa', or '20 / 10 kPa' of two pressure groups, where the largest is that many kPa."""
+    return kPa(design.content.scaled(in_MPa(pressure)))
+
+
 def _list(pressures):
     return ", ".join(plain(p) for p in pressures)
 
@@ -126,7 +131,8 @@ def _pictures(design, pressures, folder):
     bodies = _bodies(design, pressures)
     for p, (vertices, quads, segments) in zip(pressures, bodies):
         write_quads(folder / f"body_{plain(p)}kPa.vtp", vertices, quads, {"segment": segments + 1})
-    _picture_of_all(design.content.name, pressures, bodies, folder / "bodies.png")
+    titles = [_each(design, p) for p in pressures]
+    _picture_of_all(design.content.name, titles, bodies, folder / "bodies.png")
     log.info(f"bodies at every pressure: {folder / 'bodies.png'}; {FRAMES} frames of the inflation follow")
     highest = max(pressures)
     if highest > 0:
@@ -152,17 +158,17 @@ def _painted(view, body, pixels):
     return paint(view, vertices, quads, colours[segments], pixels)
 
 
-def _picture_of_all(name, pressures, bodies, path):
+def _picture_of_all(name, titles, bodies, path):
     """One panel a pressure, same camera and scale."""
     from PIL import Image
 
     (width, height), view, columns = PANEL_PIXELS, _view(bodies), min(len(bodies), 3)
     rows, top = -(-len(bodies) // columns), height // 10
     sheet = Image.new("RGB", (columns * width, rows * height + top), "white")
-    for number, (p, body) in enumerate(zip(pressures, bodies)):
+    for number, (title, body) in enumerate(zip(titles, bodies)):
         panel = _painted(view, body, PANEL_PIXELS)
         show_scale_and_axes(panel, view)
-        write_text_on(panel, (20, 16), f"{plain(p)} kPa", height / 24, "la")
+        write_text_on(panel, (20, 16), title, height / 24, "la")
         sheet.paste(panel, (number % columns * width, top + number // columns * height))
     write_text_on(sheet, (20, 14), f"{name}: reduced model", height / 18, "la")
     with atomic_path(path) as temporary:

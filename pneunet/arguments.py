@@ -9,6 +9,10 @@ from typing import NoReturn
 from pneunet.base.errors import InputError
 from pneunet.base.units import LARGEST_PRESSURE_KPA
 
+#: a design's file in its folder
+DESIGN = "design.toml"
+A_DESIGN = "a design.toml, or the folder that holds it"
+
 
 class Parser(argparse.ArgumentParser):
     """Errors are InputErrors; --pressure is not taken for --pressure-kPa: the unit is part of the name."""
@@ -50,6 +54,18 @@ def path(text: str) -> Path:
     if len(text) > 3000:
         raise argparse.ArgumentTypeError("over 3000 characters are too long a path")
     return Path(text)
+
+
+def design_file(text: str) -> Path:
+    """A design.toml, given by its own name or by its folder's."""
+    given = path(text)
+    return given / DESIGN if (given / DESIGN).is_file() else given
+
+
+def run_folder(text: str) -> Path:
+    """A design's folder, given by its own name or by its design.toml's."""
+    given = path(text)
+    return given.parent if given.name == DESIGN and given.is_file() else given
 
 
 def pressures(text: str, least: float = math.ulp(0.0)) -> list[float]:
@@ -142,7 +158,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_output(a, "out/NAME of the target")
 
     a = add("shape", "reduced model only: centrelines, 3D body, picture and animation")
-    a("design", type=path)
+    a("design", type=design_file, help=A_DESIGN)
     text = "default: five steps to the design's"
     a("--pressure-kPa", type=pressures, dest="pressures", metavar="10,20,...", help=text)
     add_law(a, "trained")
@@ -156,19 +172,19 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_output(a, "out/NAME of the file, out/workspace without one")
 
     a = add("mesh", "CAD (STEP) and tagged mesh, with volumes and checks")
-    a("design", type=path)
+    a("design", type=design_file, help=A_DESIGN)
     a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
     add_output(a, "the design's folder")
 
     a = add("export", "everything to cast it: STEP and STL of body and moulds, a sheet for the workshop")
-    a("design", type=path)
+    a("design", type=design_file, help=A_DESIGN)
     text = "printer, draft, clearances, ...; default: a bed of 220 mm and straight walls"
     a("--moulds", type=path, metavar="MOULDS.toml", help=text)
     add_output(a, "the design's folder; the pack is in its folder workshop")
 
     text = "finite elements of the whole manipulator; under MPI: pneunet run -n 2 solve DESIGN.toml"
     a = add("solve", text)
-    a("design", type=path)
+    a("design", type=design_file, help=A_DESIGN)
     text = "default: the design's; 0: its [loads] alone"
     a("--pressure-kPa", type=one_pressure, dest="pressure", help=text)
     a("--mesh-size-mm", type=mesh_size, help="largest edge of the elements; default: the design's")
@@ -218,11 +234,11 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_output(a, "law.npz beside the data; tables get the same name with .md", "LAW.npz")
 
     a = add("report", "one HTML page: target, reduced prediction and finite elements side by side")
-    a("directory", type=path)
+    a("directory", type=run_folder, help=A_DESIGN)
     add_law(a, None)
 
     a = add("view", "a page to turn the body in any browser, with a slider over load steps; a window, a film")
-    a("run", type=path, metavar="RUN", help="a design's folder")
+    a("run", type=run_folder, metavar="RUN", help=A_DESIGN)
     a("--film", choices=("gif", "mp4"), help="of the inflation, as well")
     a("--window", action="store_true", help="open a window as well, where there is a display")
     add_law(a, None)
@@ -231,7 +247,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a = add(
         "compare", "a measurement over pressure beside its prediction, and the modulus that it speaks for"
     )
-    a("run", type=path, metavar="RUN", help="a design's folder, or its design.toml")
+    a("run", type=run_folder, metavar="RUN", help=A_DESIGN)
     text = "markers, tip, centreline, angle or displacement over pressure (docs/use-compare.md)"
     a("measured", type=path, metavar="MEASURED.csv", help=text)
     text = "where markers sit on the body at rest: marker, x_mm, y_mm, z_mm"

@@ -18,13 +18,34 @@ PIXELS = (900, 720)
 Overlay = tuple[np.ndarray, dict]
 
 
+#: a view will do if it shows so much of the breadth that the best one shows
+OPEN_ENOUGH = 0.6
+
+
 def camera_angles(points: np.ndarray) -> tuple[float, float]:
     """(elevation, azimuth) in degrees from which a curve (n, 3) with z up is seen well: 25 degrees above, and
-    across its longest horizontal direction, turned by 30 degrees so that depth shows."""
-    flat = np.asarray(points)[:, :2] - np.mean(np.asarray(points)[:, :2], axis=0)
-    _, _, directions = np.linalg.svd(flat, full_matrices=False)
-    along = directions[0] * (1 if directions[0] @ (flat[-1] - flat[0]) >= 0 else -1)
-    return 25.0, float(np.degrees(np.arctan2(along[1], along[0]))) - 90.0 + 30.0
+    across its longest horizontal direction, turned by 30 degrees so that depth shows; from the other side or
+    higher where the curve looks nearly straight from there."""
+    centred = np.asarray(points, float) - np.mean(points, axis=0)
+    _, _, directions = np.linalg.svd(centred[:, :2], full_matrices=False)
+    along = directions[0] * (1 if directions[0] @ (centred[-1] - centred[0])[:2] >= 0 else -1)
+    across = float(np.degrees(np.arctan2(along[1], along[0]))) - 90.0
+    views = [(elevation, across + turn) for elevation in (25.0, 50.0) for turn in (30.0, -30.0)]
+    breadths = [_breadth(centred @ np.column_stack(_image_axes(*view))) for view in views]
+    enough = OPEN_ENOUGH * max(breadths) - 1e-9 * np.linalg.norm(centred)  # a straight line: any will do
+    return next(view for view, breadth in zip(views, breadths) if breadth >= enough)
+
+
+def _breadth(image):
+    """How far points (n, 2) about their mean spread across their longest direction."""
+    return np.linalg.svd(image, compute_uv=False)[-1]
+
+
+def _image_axes(elevation, azimuth):
+    """Unit vectors right and up (3,) of the image that is seen from there, degrees."""
+    e, a = np.radians((elevation, azimuth))
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    return right, np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
 
 
 def figure(width: float, height: float) -> Any:
@@ -76,11 +97,7 @@ class View:
 def view_of(points: np.ndarray, margin: float = 1.12) -> View:
     """The View that holds all points (n, 3), seen from `camera_angles`."""
     points = np.asarray(points, float)
-    elevation, azimuth = np.radians(camera_angles(points))
-    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    up = np.array(
-        [-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)]
-    )
+    right, up = _image_axes(*camera_angles(points))
     towards = np.cross(right, up)
     image = points @ np.column_stack([right, up, towards])
     middle = (image.min(axis=0) + image.max(axis=0)) / 2

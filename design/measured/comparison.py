@@ -117,9 +117,17 @@ class MeasuredComparison:
         return float(np.mean((self.errors <= self.bars)[self.loaded][seen]))
 
     @property
-    def way(self) -> np.ndarray:
-        """(n,) mm, how far the last point measured has gone from where it was at the first level."""
-        values = self.aligned.values[:, -1]
+    def told(self) -> int:
+        """The point whose way is told and drawn: the tip, or the marker that should go farthest."""
+        names, predicted = self.measured.names, self.predicted.plain
+        if TIP in names:
+            return names.index(TIP)
+        return int(np.argmax(np.linalg.norm(predicted[-1] - predicted[0], axis=1))) if names else -1
+
+    def way(self, values: np.ndarray) -> np.ndarray:
+        """(n,) of values (n, k, d), measured or predicted: how far the point `told` has gone from where it
+        was at the first level, mm, or the value itself."""
+        values = values[:, self.told]
         return np.linalg.norm(values - values[0], axis=1) if values.shape[1] == 3 else values[:, 0]
 
     @property
@@ -128,8 +136,9 @@ class MeasuredComparison:
         if self.solved is None:
             return None
         kPa, way = self.solved
-        within = (self.pressures_kPa <= 1.001 * kPa[-1]) & (np.arange(len(self.way)) >= self.loaded.start)
-        off = (self.way - np.interp(self.pressures_kPa, kPa, way))[within]
+        measured = self.way(self.aligned.values)
+        within = (self.pressures_kPa <= 1.001 * kPa[-1]) & (np.arange(len(measured)) >= self.loaded.start)
+        off = (measured - np.interp(self.pressures_kPa, kPa, way))[within]
         return float(np.sqrt(np.nanmean(off**2))) if len(off) else None
 
     @cached_property
@@ -335,7 +344,7 @@ def compare(
 
 def _solved(run: Path, measured: Measurement) -> tuple[np.ndarray, np.ndarray] | None:
     """MeasuredComparison.solved; None where there are no finite elements, or the tip was not measured."""
-    at_tip = measured.what in (CENTRELINE, DISPLACEMENT) or measured.names[-1:] == (TIP,)
+    at_tip = measured.what in (CENTRELINE, DISPLACEMENT) or TIP in measured.names
     folder = run if run.is_dir() else run.parent
     if not at_tip or not (folder / "solve").is_dir():
         return None
@@ -385,5 +394,5 @@ def run_compare(
     folder = found.save(base / "compare" if directory is None else directory)
     for line in found.lines():
         log.info(line)
-    log.info(f"written: {folder}/compare.csv, run.json" + ", fitted.toml" * (found.fit is not None))
+    log.info(f"written: {folder} with {', '.join(sorted(file.name for file in folder.iterdir()))}")
     return found

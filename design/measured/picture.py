@@ -22,7 +22,7 @@ def comparison_figure(found: "MeasuredComparison") -> "Figure":
     points = found.aligned.values.shape[2] == 3
     fig = figure(14.5 if points else 9.8, 4.6)
     axes = fig.subplots(1, 3 if points else 2)
-    _over_pressure(axes[0], found, points)
+    _over_pressure(axes[0], found)
     _errors(axes[1], found)
     if points:
         _shapes(axes[2], found)
@@ -31,28 +31,32 @@ def comparison_figure(found: "MeasuredComparison") -> "Figure":
     return fig
 
 
-def _told(values, points):
-    """(n, k) of (n, k, d): distance from where each point was first, or the value itself."""
-    return np.linalg.norm(values - values[0], axis=2) if points else values[:, :, 0]
-
-
-def _over_pressure(ax, found, points):
-    kPa, last = found.pressures_kPa, -1
-    measured, predicted = (_told(v, points)[:, last] for v in (found.aligned.values, found.predicted.plain))
+def _over_pressure(ax, found):
+    kPa, told, predicted = found.pressures_kPa, found.told, found.way(found.predicted.plain)
     half = found.predicted.half_width
     if half is not None:
-        low, high = predicted - half[:, last], predicted + half[:, last]
-        ax.fill_between(kPa, low, high, color=REDUCED, alpha=0.2, linewidth=0, label="its 90 % interval")
+        low, high = predicted - half[:, told], predicted + half[:, told]
+        ax.fill_between(
+            kPa, low, high, color=REDUCED, alpha=0.2, linewidth=0, label="90 % interval of the prediction"
+        )
     ax.plot(kPa, predicted, color=REDUCED, label="predicted")
     if found.fitted is not None:
         label = f"modulus x {found.fit.change.modulus:.3f}"
-        ax.plot(kPa, _told(found.fitted, points)[:, last], "--", color=FITTED, label=label)
+        ax.plot(kPa, found.way(found.fitted), "--", color=FITTED, label=label)
     if found.solved is not None:
         ax.plot(*found.solved, ":", color=FINITE_ELEMENTS, label="finite elements")
-    spread = found.measured.spread[:, last]
-    ax.errorbar(kPa, measured, np.nan_to_num(spread), fmt="o", color=TARGET, markersize=4, label="measured")
-    name = found.measured.names[last] if found.measured.names else "tip"
-    what = "angle" if found.measured.unit == "deg" else f"way of {name}"
+    spread = found.measured.spread[:, told]
+    ax.errorbar(
+        kPa,
+        found.way(found.aligned.values),
+        np.nan_to_num(spread),
+        fmt="o",
+        color=TARGET,
+        markersize=4,
+        label="measured",
+    )
+    name = found.measured.names[told] if found.measured.names else "tip"
+    what = "angle" if found.measured.unit == "deg" else f"how far {name} has moved"
     ax.set(xlabel="pressure, kPa", ylabel=f"{what}, {found.measured.unit}")
     ax.legend(fontsize=8)
 

@@ -55,7 +55,7 @@ def curve_picture(run: DesignFolder, comparison: "Comparison", folder: Path) -> 
         return []
     fig = figure(11.0, 6.2)
     curve_panels(fig, curves, bands)
-    legend(fig, curves, design.manipulator)
+    legend(fig, curves, design.manipulator.segments if bands else ())
     save(fig, folder / "curves.png", dpi=110)
     coloured = "; segments coloured along the finite element curve" if bands else ""
     return [("curves.png", f"Centrelines in 3D and in two projections, equal scale{coloured}.")]

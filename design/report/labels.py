@@ -7,7 +7,7 @@ from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
 
 TARGET, REDUCED, FINITE_ELEMENTS = "#30363d", "#1f6fb2", "#d9480f"
 STYLES: dict[str, dict] = {
-    "target": {"color": TARGET, "linestyle": (0, (4, 2)), "linewidth": 1.8},
+    "target": {"color": TARGET, "linestyle": (0, (4, 2)), "linewidth": 1.8, "zorder": 4},
     "reduced": {"color": REDUCED, "linestyle": "-", "linewidth": 2.0},
     "finite elements": {"color": FINITE_ELEMENTS, "linestyle": "-", "linewidth": 2.0},
 }

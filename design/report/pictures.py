@@ -11,7 +11,7 @@ from pneunet.design.report.labels import STYLES, kPa, plain, segment_colour, seg
 from pneunet.design.target.metrics import Errors
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile
-from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced.rod.centreline import Centreline
 
 if TYPE_CHECKING:
@@ -61,7 +61,8 @@ def _share_filled(ax, middle, half):
 def curve_panels(
     figure: "Figure", curves: Sequence[Line], segments: Sequence[Band] = (), bottom: float = 0.06
 ) -> None:
-    """3D view and the x-y and x-z projections of curves, with the bands of segments under them."""
+    """3D view and the x-y and x-z projections of curves, with the bands of segments under them and the
+    dashes of a target in front."""
     everything = np.vstack([points for _, points, _ in curves])
     grid = figure.add_gridspec(
         2, 2, width_ratios=[1.5, 1], left=0.03, right=0.97, bottom=bottom, top=0.87, wspace=0.16, hspace=0.32
@@ -103,16 +104,16 @@ def segment_bands(manipulator: Manipulator, s: np.ndarray, points: np.ndarray) -
     return bands
 
 
-def legend(figure: "Figure", curves: Sequence[Line], manipulator: Manipulator) -> None:
-    """At the top right: what the lines are, and below it the segments' colours with their names."""
+def legend(figure: "Figure", curves: Sequence[Line], segments: Sequence[Segment]) -> None:
+    """At the top right: what the lines are, and below it the colours of the segments that are drawn."""
     from matplotlib.lines import Line2D
 
     lines = [Line2D([], [], label=label, **STYLES[style]) for label, _, style in curves]
     bands = [
         Line2D([], [], color=segment_colour(i), linewidth=9, alpha=0.75, label=f"{i + 1}  {segment_name(s)}")
-        for i, s in enumerate(manipulator.segments)
+        for i, s in enumerate(segments)
     ]
-    for handles, height in ((lines, 0.995), (bands, 0.955)):
+    for handles, height in ((lines, 0.995), (bands, 0.955))[: 1 + bool(bands)]:
         figure.legend(
             handles=handles,
             loc="upper right",
@@ -151,9 +152,14 @@ def design_figure(
         caption = error_caption(errors)
     fig, body = figure(12.0, 7.0), content.manipulator
     curve_panels(fig, curves, segment_bands(body, line.s, line.points), bottom=0.15)
-    legend(fig, curves, body)
+    legend(fig, curves, body.segments)
     fig.text(0.025, 0.975, content.name, fontsize=15, weight="bold", va="top")
     told = f"{kPa(content.pressure)}, {body.chambers} chambers"
-    fig.text(0.025, 0.925, f"{told}, {plain(body.length, 1)} mm long at rest", fontsize=10, va="top")
-    fig.text(0.025, 0.02, caption, fontsize=9, linespacing=1.5)
+    fig.text(
+        0.025,
+        0.02,
+        f"{told}, {plain(body.length, 1)} mm long at rest\n{caption}",
+        fontsize=9,
+        linespacing=1.5,
+    )
     return fig

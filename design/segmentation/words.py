@@ -70,7 +70,6 @@ def _limits(fit, pieces):
                 on.append(f"the {name} of piece {i} to {limit / PER_MM_PER_M:.3g} {unit}")
     if on:
         free = refined(replace(fit, data=replace(fit.data, reach={})))
-        yield (
-            f"given up for what can be reached: {', '.join(on)}; RMS {fit.rms:.3g} mm instead of"
-            f" {free.rms:.3g} mm"
-        )
+        with_limits, without = f"{fit.rms:.3g}", f"{free.rms:.3g}"
+        cost = "at no cost" if with_limits == without else f"RMS {with_limits} mm instead of {without} mm"
+        yield f"given up for what can be reached: {', '.join(on)}; {cost}"

@@ -206,7 +206,7 @@ def _inflate(pack):
 
 def _unknown(pack):
     unknown = [m.name for m in pack.design.manipulator.materials if m.elongation_at_break == float("inf")]
-    return f"When {', '.join(unknown)} tears is not known." if unknown else ""
+    return f"At what stretch the silicone tears is not known: {'; '.join(unknown)}." if unknown else ""
 
 
 def _keep(pack):

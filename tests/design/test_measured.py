@@ -208,6 +208,10 @@ def test_finite_elements_of_the_folder_stand_beside_it(tmp_path):
     found = compare(tmp_path / "run", tmp_path / "m.csv")
     assert found.solved_rms == pytest.approx(np.sqrt(np.mean((way[1:] / 2) ** 2)), rel=1e-6)
     assert any("finite elements" in line for line in found.lines())
+    # a marker at the tip is the tip wherever its columns stand: here before those of the base
+    names = ["p_kPa", *(f"{name}_{axis}_mm" for name in ("tip", "base") for axis in "xyz")]
+    write_csv(tmp_path / "m.csv", names, np.column_stack([steps["pressure_kPa"], tips, 0 * tips]))
+    assert compare(tmp_path / "run", tmp_path / "m.csv").solved_rms == pytest.approx(0, abs=1e-6)
 
 
 BAD = {

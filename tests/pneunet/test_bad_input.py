@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from pneunet.arguments import design_file, run_folder
 from pneunet.cli import main
 from tests.pneunet.sayings import changed, files, refused, said
 
@@ -195,6 +196,17 @@ def test_design(folder, capsys, command, old, new, message):
     error = refused(capsys, folder, command, "bad.toml", "-o", "out")
     assert "bad.toml" in error and message in error
     assert not (folder / "out").exists()
+
+
+def test_a_design_goes_by_its_file_or_its_folder(tmp_path):
+    (tmp_path / "design.toml").write_text(DESIGN)
+    for given in (tmp_path, tmp_path / "design.toml"):
+        assert design_file(str(given)) == tmp_path / "design.toml"
+        assert run_folder(str(given)) == tmp_path
+    assert (
+        design_file("other.toml") == Path("other.toml")
+        and run_folder("none/design.toml").name == "design.toml"
+    )
 
 
 @pytest.mark.parametrize(
