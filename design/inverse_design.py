@@ -259,7 +259,8 @@ def answer(design: Design) -> Iterator[str]:
         )
     silicone, casting = f"{target.material.name}, mu = {target.material.mu:.4g} MPa", target.casting
     if casting.silicones:
-        yield f"chosen of {len(casting.silicones)} silicones: {silicone}"
+        count = len(casting.silicones)
+        yield f"chosen of {count} silicones: {silicone}" if count > 1 else f"silicone: {silicone}"
     elif casting.moduli:
         low, high = casting.moduli
         yield f"chosen modulus: mu = {target.material.mu:.4g} MPa, of {low:g}..{high:g} MPa"
