@@ -1,8 +1,10 @@
 """Inverse design: from what is wanted to what to cast, and at what pressure."""
 
 import logging
+import textwrap
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +17,10 @@ from pneunet.base.materials.laws import PAPER_TWISTING
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.design import Design, chosen_law
+from pneunet.design.report.labels import kPa
 from pneunet.design.search.aims import OBJECTIVES, PAIRED
 from pneunet.design.search.doubts import WARN, WAYS, tell_doubts
-from pneunet.design.search.inverse import search
+from pneunet.design.search.inverse import Map, search
 from pneunet.design.search.tolerances import largest, tolerances
 from pneunet.design.search.wanted import wanted
 from pneunet.design.target.extraction import Extracted, rates
@@ -34,6 +37,12 @@ RATES = {
     "cylinder_curvature_per_m": ("cylinder curvature", "1/m"),
     "pitch_mm": ("pitch", "mm"),
 }
+#: of the design's pressure: less is what the casting grid leaves of a limit, not a limit that is exceeded
+ROUNDED = 0.98
+#: of a terminal
+COLUMNS = 100
+#: dimensions that are named as those that move the shape most
+MOST = 4
 log = logging.getLogger(__name__)
 
 
@@ -43,12 +52,14 @@ def inverse_design(
     law: str | SegmentLaw = "trained",
     objective: str = PAIRED,
     outside: str = WARN,
+    mapping: Map = map,
 ) -> Design:
     """The Design whose predicted centreline lies on the target; writes and prints nothing.
 
     target: a Target, its file, or points (n, 3) in mm. law: 'trained', 'analytic', a law's file (.npz) or a
     SegmentLaw. objective: 'paired' or 'eq27' (docs/use-design.md). outside: 'warn' or 'refuse' a design that
-    the law doubts. InputError on bad input, ConvergenceError where the law has no answer.
+    the law doubts. mapping: a `map` that spreads the starts, over processes for instance; the answer does not
+    depend on it. InputError on bad input, ConvergenceError where the law has no answer.
     """
     started = time.perf_counter()
     for name, value, known in (("objective", objective, OBJECTIVES), ("outside", outside, WAYS)):
@@ -56,15 +67,17 @@ def inverse_design(
             raise InputError(f"{name} = '{value}' is not known: write {' or '.join(known)}")
     law, target = chosen_law(law), as_target(target)
     log.info(f"target {target.name}: {len(target.points)} points; {target.base_told}")
-    asked = wanted(target, law)
-    target = asked.target
-    log.info(f"{asked.note}: {len(asked.pieces)} pieces, {target.length:.2f} mm")
-    for i, piece in enumerate(asked.pieces, start=1):
-        log.info(f"  piece {i}: {describe(piece)}")
-    for text in asked.notes:
-        log.info(f"  {text}")
-    found = search(target, asked.pieces, law, objective)
+    asked = wanted(replace(target, material=target.softest), law)
+    target = replace(asked.target, material=target.material)
+    count = len(asked.pieces)
+    told = [f"{asked.note}: {count} piece{'s' * (count > 1)}, {target.length:.2f} mm"]
+    told += [f"  piece {i}: {describe(piece)}" for i, piece in enumerate(asked.pieces, start=1)]
+    for text in wrapped((*told, *(f"  {note}" for note in asked.notes))):
+        log.info(text)
+    found = search(target, asked.pieces, law, objective, mapping=mapping)
     best = found.best
+    chosen = best.manipulator.segments[0].material
+    target = replace(target, material=chosen)
     content = DesignFile(
         best.manipulator, best.pressure, name=target.name, base_pose=best.base_pose, loads=target.loads
     )
@@ -82,9 +95,12 @@ def inverse_design(
             "notes": list(asked.notes),
             "objective": objective,
             "law": law.name,
+            "silicone": chosen.name,
+            "mu_MPa": round(chosen.mu, 6),
             "followed": design.followed,
             "doubts": list(design.doubts),
             "active_bounds": list(found.active),
+            "pressure_limits": list(_pressure_limits(content, law)),
             "flush_underside_costs_mm": round(found.flush_costs, 4),
             "target_error": design.errors.table() if design.errors else {},
             "shape_error": [e.table() for e in design.further_errors],
@@ -92,7 +108,7 @@ def inverse_design(
             "alternative": [_table(c) for c in found.alternatives],
             "piece": [
                 {**piece.table(), "predicted": predicted(piece.kind, RodStrains(e, k))}
-                for piece, e, k in zip(asked.pieces, design.strains.e, design.strains.k)
+                for piece, e, k in zip(found.pieces, design.strains.e, design.strains.k)
             ],
         }
     )
@@ -101,10 +117,13 @@ def inverse_design(
 
 def _table(candidate):
     """A Candidate in numbers, for result tables."""
-    segments = candidate.manipulator.segments
+    segments, one = candidate.manipulator.segments, candidate.pressures.shape[1] == 1
     return {
-        "rms_mm": round(candidate.rms, 4),
-        "pressure_kPa": [round(KPA_PER_MPA * float(P), 3) for P in candidate.pressures],
+        "rms_mm": round(candidate.centreline_rms, 4),
+        "misfit_mm": round(candidate.rms, 4),
+        "silicone": segments[0].material.name,
+        "mu_MPa": round(segments[0].material.mu, 6),
+        "pressure_kPa": (KPA_PER_MPA * candidate.pressures.squeeze(axis=1 if one else ())).round(3).tolist(),
         "segment": [to_table(s) for s in segments],
     }
 
@@ -117,7 +136,12 @@ def as_target(target: Target | str | Path | np.ndarray) -> Target:
 
 
 def run_design(
-    target: str | Path, directory: str | Path, law: SegmentLaw, objective: str = PAIRED, outside: str = WARN
+    target: str | Path,
+    directory: str | Path,
+    law: SegmentLaw,
+    objective: str = PAIRED,
+    outside: str = WARN,
+    mapping: Map = map,
 ) -> Design:
     """`pneunet design`: the inverse design of a target's file, saved in a folder, with its table on the
     screen.
@@ -126,9 +150,9 @@ def run_design(
     """
     wanted = Target.read(target)
     with output_folder(directory) as folder:
-        design = inverse_design(wanted, law=law, objective=objective, outside=outside)
+        design = inverse_design(wanted, law=law, objective=objective, outside=outside, mapping=mapping)
         design.write(folder)
-    for text in (*summary(design), *answer(design)):
+    for text in wrapped((*summary(design), *answer(design))):
         log.info(text)
     return design
 
@@ -164,25 +188,52 @@ def summary(design: Design) -> Iterator[str]:
             f"  {s.gap:6.2f} {s.length:7.1f}{rolled}"
         )
     length, seconds = f"undeformed length {design.manipulator.length:.1f} mm", design.effort["wall_seconds"]
-    yield f"pressure {design.pressure_kPa:.2f} kPa, {length}, {seconds:.1f} s"
+    yield f"pressure {kPa(design.content.pressure)}, {length}, {seconds:.1f} s"
     if design.errors:
         yield "errors of the reduced prediction:"
         yield from ("  " + text for text in design.errors.lines())
     shapes = design.target.shapes if design.target else ()
     for i, (shape, e) in enumerate(zip(shapes, design.further_errors), start=1):
         told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
-        yield f"shape {i} at {KPA_PER_MPA * shape.pressures[0]:.2f} kPa: {told}"
-    yield "active bounds: " + ("; ".join(design.active_bounds) or "none")
+        yield f"shape {i} at {kPa(shape.pressures)}: {told}"
+    yield from _listed("active bounds", design.active_bounds or ["none"])
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"
     if design.tolerances:
-        yield "what moves it most: " + "; ".join(
-            f"{'segment ' + str(e.segment) + ' ' if e.segment else ''}{e.name.rsplit('_', 1)[0]}"
-            f" {e.change}: {e.rms:.2f} mm RMS, {e.tip:.2f} mm at the tip"
-            for e in largest(design.tolerances.effects, 4)
+        yield from _listed("what moves it most", map(str, largest(design.tolerances.effects, MOST)))
+    yield from _listed("alternatives", (f"{i}: {c}" for i, c in enumerate(design.alternatives, start=1)))
+    yield from _listed("limits of the pressure", design.content.result.get("pressure_limits", ()))
+
+
+def _listed(heading: str, rows: Iterable[str]) -> Iterator[str]:
+    """The heading, then a row a line; nothing without rows."""
+    for i, row in enumerate(rows):
+        if i == 0:
+            yield f"{heading}:"
+        yield f"  {row}"
+
+
+def _pressure_limits(content, law):
+    """A text each, lowest first."""
+    from pneunet.design.workshop.limits import limits
+
+    for limit in limits(content, law):
+        exceeded = " (EXCEEDED)" * (limit.pressure < ROUNDED * content.largest_pressure)
+        yield f"{kPa(limit.pressure)}{exceeded}: {limit.reason}"
+
+
+def wrapped(lines: Iterable[str], width: int = COLUMNS) -> Iterator[str]:
+    """Lines no wider than a terminal; what goes on is indented further."""
+    for text in lines:
+        indent = " " * (len(text) - len(text.lstrip()))
+        yield from textwrap.wrap(
+            text,
+            width,
+            subsequent_indent=indent + "    ",
+            drop_whitespace=True,
+            break_long_words=False,
+            break_on_hyphens=False,
         )
-    for i, candidate in enumerate(design.alternatives, start=1):
-        yield f"alternative {i}: {candidate}"
 
 
 def answer(design: Design) -> Iterator[str]:
@@ -206,6 +257,11 @@ def answer(design: Design) -> Iterator[str]:
             f" {spread.law_tip:.1f} mm (90 % of cases) for the law, {spread.mesh_tip:.1f} mm for the mesh of"
             " its cells, which is a little too stiff"
         )
-    if target.material is PAPER_TWISTING:
-        material = f"{target.material.name}, mu = {target.material.mu:g} MPa"
-        yield f"ASSUMED silicone: {material}; give yours as [material] in a target's TOML"
+    silicone, casting = f"{target.material.name}, mu = {target.material.mu:.4g} MPa", target.casting
+    if casting.silicones:
+        yield f"chosen of {len(casting.silicones)} silicones: {silicone}"
+    elif casting.moduli:
+        low, high = casting.moduli
+        yield f"chosen modulus: mu = {target.material.mu:.4g} MPa, of {low:g}..{high:g} MPa"
+    elif target.material == PAPER_TWISTING:
+        yield f"ASSUMED silicone: {silicone}; give yours as [material] in a target's TOML"

@@ -171,7 +171,7 @@ def design_tables(design: DesignFile) -> dict:
         if segment.material == first:
             del row["material"]
     tables = {"schema": SCHEMA} | to_table(design) | design.control.table()
-    for key, usual in (("target", ""), ("contact", CONTACTS[0])):
+    for key, usual in (("target", ""), ("contact", CONTACTS[0]), ("element", "tetrahedra")):
         if tables[key] == usual:
             del tables[key]
     tables["material"] = material_to_table(first)

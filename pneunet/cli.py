@@ -31,7 +31,10 @@ def design(a: Namespace) -> int:
     from pneunet.reduced.choice import choose_law
 
     folder = a.output or Path("out") / a.target.stem
-    found = run_design(a.target, folder, choose_law(a.law), outside=a.outside)
+    with rank_map() as mapping:
+        if not mapping:  # the work for rank 0 is done
+            return 0
+        found = run_design(a.target, folder, choose_law(a.law), outside=a.outside, mapping=mapping)
     return 0 if found.followed else NOT_FOLLOWED
 
 

@@ -1,5 +1,6 @@
 """Which law predicts: the trained one that comes along, the analytic models, or a trained law in a file."""
 
+import copyreg
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,6 +20,14 @@ TRAINED, ANALYTIC = "trained", "analytic"
 def shipped_law() -> TrainedLaw:
     """The trained law that comes along."""
     return read_law(SHIPPED, TRAINED)
+
+
+def _packed(law):
+    """Another process reads the law that comes along by itself: once used it is a hundred megabytes."""
+    return (choose_law, (TRAINED,)) if law.name == TRAINED else object.__reduce_ex__(law, 2)
+
+
+copyreg.pickle(TrainedLaw, _packed)
 
 
 def choose_law(name: str = TRAINED) -> SegmentLaw:

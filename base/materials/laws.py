@@ -8,7 +8,7 @@ here and a name in LAWS.
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -28,6 +28,7 @@ STABLE_AT_LEAST = 1.2
 BODY_LIMITS, LAYER_LIMITS = (100, 5), (1e4, 1.33)
 
 Law = TypeVar("Law")
+One = TypeVar("One", bound="Hyperelastic")
 
 
 def unchecked(law: type[Law], **parameters: Any) -> Law:
@@ -294,6 +295,13 @@ PAPER_HELICAL = NeoHookean(
 )
 
 LAWS: dict[str, type[Hyperelastic]] = {cls.law: cls for cls in (NeoHookean, MooneyRivlin, Yeoh, Gent, Ogden)}
+
+
+def of_modulus(material: One, mu: float) -> One:
+    """The material with all of its moduli in proportion, so that its shear modulus at rest is mu (MPa)."""
+    own, share = [f for f in fields(material) if f.name in material.parameters], mu / material.mu
+    moduli = [f.name for f in own if f.metadata["unit"] == "MPa"]
+    return replace(material, **{name: share * getattr(material, name) for name in moduli})
 
 
 def silicone(name: str) -> Hyperelastic:

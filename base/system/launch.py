@@ -48,7 +48,7 @@ SETTINGS = {
 RANKS_PER_CORE = 64
 HEARING_SECONDS = 0.3
 #: sub-commands whose ranks share the work; of others they would all do the same
-PARALLEL = ("solve", "study", "campaign", "train", "workspace")
+PARALLEL = ("design", "solve", "study", "campaign", "train", "workspace")
 
 
 def environment() -> dict[str, str]:

@@ -25,7 +25,8 @@ FINE = 401
 class Aim:
     """points (s, 3) in mm at fractions (s,) of the deformed length; edges (s, 3, 2) or None: the section's
     width and height directions there, times half a width in mm; weights (s,) of mean 1 or None. nearest: the
-    fractions are those of the nearest points instead. pressure in MPa, None: a variable."""
+    fractions are those of the nearest points instead. pressure in MPa, or several of groups, None: the
+    design's own."""
 
     fractions: np.ndarray
     points: np.ndarray
@@ -33,7 +34,7 @@ class Aim:
     half_width: float = 0.0
     nearest: bool = False
     weights: np.ndarray | None = None
-    pressure: float | None = None
+    pressure: tuple[float, ...] | None = None
 
     @classmethod
     def of(
@@ -41,7 +42,7 @@ class Aim:
         wanted: Target | TargetShape,
         width: float,
         objective: str = PAIRED,
-        pressure: float | None = None,
+        pressure: tuple[float, ...] | None = None,
     ) -> "Aim":
         """What a Target or a TargetShape asks of a body of a width in mm."""
         given = wanted.weights
@@ -65,12 +66,12 @@ class Aim:
         """Its own curve, unless that is but a guide, then its further shapes, then where the tip is to be."""
         own = target.weights is None or bool(target.weights.any())
         aims = [cls.of(target, width, objective)] if own else []
-        aims += [cls.of(shape, width, pressure=float(shape.pressures[0])) for shape in target.shapes]
+        aims += [cls.of(shape, width, pressure=shape.pressures) for shape in target.shapes]
         if target.tip is not None:
             tip, last = target.tip, np.ones(1)
             weights = np.ones(len(tip.points)) if tip.weights is None else tip.weights / tip.weights.mean()
             for point, pressure, weight in zip(tip.points, tip.pressures, weights):
-                aims.append(cls(last, point[None], weights=weight * last, pressure=float(pressure)))
+                aims.append(cls(last, point[None], weights=weight * last, pressure=(float(pressure),)))
         return tuple(aims)
 
     def stations(self, rod: PlacedRod) -> Stations:

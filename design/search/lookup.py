@@ -1,8 +1,8 @@
 """Lookup table for the first guess (the paper's Fig. 8f): what each kind of segment does over angle, height,
 pressure.
 
-All segments share one pressure, so the table is read pressure by pressure: at each, every piece takes the
-angle and chamber height whose deformed active length turns most nearly as the piece asks, in rad.
+Segments share pressures, so the table is read pressure by pressure: at each, every piece takes the angle and
+chamber height whose deformed active length turns most nearly as the piece asks, in rad.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,18 @@ HEIGHT_WEIGHT = 0.1  # rad per mm away from the start height: decides only betwe
 
 @dataclass(frozen=True)
 class Guess:
-    """One entry read from the table for every piece: `segments` (chambers 1), real-valued `counts`, pressure
-    in MPa."""
+    """One entry read from the table for every piece: `segments` (chambers 1), real-valued `counts`, pressures
+    in MPa of each."""
 
-    pressure: float
+    pressures: tuple[float, ...]
     segments: tuple[Segment, ...]
     counts: tuple[float, ...]
     misfit: float
+
+    @property
+    def pressure(self) -> float:
+        """The largest, MPa."""
+        return max(self.pressures)
 
 
 def responses(strains: RodStrains, twisting: bool) -> np.ndarray:
@@ -49,27 +54,27 @@ def first_guesses(
     pressures: np.ndarray,
     law: SegmentLaw,
 ) -> list[Guess]:
-    """`Guess`es, best first, one for every pressure at which each piece has an entry.
+    """`Guess`es, best first, one for every row of pressures at which each piece has an entry.
 
     prototypes: a Segment for each with its start dimensions; angles (deg) and heights (mm): the grid of each
-    piece; pressures: increasing, MPa.
+    piece; pressures (m, pieces): increasing in m, MPa.
     """
     tables: dict[tuple, tuple[list[Segment], np.ndarray]] = {}
     best = []
-    for piece, prototype, a, h in zip(pieces, prototypes, angles, heights):
+    for piece, prototype, a, h, own in zip(pieces, prototypes, angles, heights, pressures.T):
         if prototype.kind == PASSIVE:
             best.append([(0.0, prototype, 0.0)] * len(pressures))
             continue
-        key = prototype, tuple(a), tuple(h)
+        key = prototype, tuple(a), tuple(h), tuple(own)
         if key not in tables:
             segments = [replace(prototype, angle=float(x), chamber_height=float(y)) for x in a for y in h]
-            tables[key] = segments, responses(law.table(segments, pressures), prototype.kind == TWISTING)
+            tables[key] = segments, responses(law.table(segments, own), prototype.kind == TWISTING)
         best.append(_nearest(piece, prototype, *tables[key]))
     guesses = []
-    for j, pressure in enumerate(pressures):
+    for j, row in enumerate(pressures.tolist()):
         misfits, chosen, counts = zip(*(entries[j] for entries in best))
         if np.isfinite(sum(misfits)):
-            guesses.append(Guess(float(pressure), chosen, counts, float(sum(misfits))))
+            guesses.append(Guess(tuple(row), chosen, counts, float(sum(misfits))))
     return sorted(guesses, key=lambda guess: guess.misfit)
 
 

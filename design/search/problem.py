@@ -10,6 +10,7 @@ import numpy as np
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.left_jacobian import LeftJacobian
+from pneunet.base.materials.laws import of_modulus
 from pneunet.design.search.aims import Aim
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
@@ -57,6 +58,8 @@ class Body:
         i = variable.segments[0]
         if variable.name == "chambers":
             return float(self.counts[i])
+        if variable.name == "mu":
+            return self.segments[i].material.mu
         if variable.name == "pressure":
             return float(self.pressures[variable.aims[0], i])
         return float(getattr(self.segments[i], variable.name))
@@ -66,11 +69,15 @@ class Body:
         counts, pressures = self.counts.copy(), self.pressures.copy()
         changes: list[dict] = [{} for _ in self.segments]
         for variable, value in zip(variables, x.tolist()):
+            if variable.name == "mu":
+                material = of_modulus(self.segments[variable.segments[0]].material, value)
             for i in variable.segments:
                 if variable.name == "chambers":
                     counts[i] = value
                 elif variable.name == "pressure":
                     pressures[list(variable.aims), i] = value
+                elif variable.name == "mu":
+                    changes[i]["material"] = material
                 else:
                     changes[i][variable.name] = value
         segments = tuple(replace(s, **change) if change else s for s, change in zip(self.segments, changes))
@@ -160,7 +167,7 @@ class Problem:
         n, pressures = len(body.segments), body.pressures[number]
         names = FIELDS if self.everything else {v.name for v in self.variables}
         states = cell_states(self.law, body.segments, pressures, names)
-        by_laws = states.strains_by[:, :, : len(OF_LAWS)]
+        by_laws = states.strains_by
         by_base = by_strains = None
         if self.gravity.any():
             found = loaded(
@@ -203,9 +210,7 @@ class Problem:
         states = shape.states
         segment, what = np.nonzero(states.excess)
         by = np.zeros((len(segment), len(states.excess), len(FIELDS)))
-        by[np.arange(len(segment))[:, None], segment[:, None], OF_LAWS] = states.excess_by[
-            segment, what, : len(OF_LAWS)
-        ]
+        by[np.arange(len(segment))[:, None], segment[:, None], OF_LAWS] = states.excess_by[segment, what]
         return BEYOND * states.excess[segment, what], BEYOND * self.columns(by, number)
 
     def _unseen_twists(self, body, shape):
@@ -218,7 +223,7 @@ class Problem:
                 half, length = segment.width / 2, count * segment.pitch
                 turn = k1 * length - piece.twist * piece.length
                 by[i] = half * k1 * cells_length_by(segment, count)
-                by[i, OF_LAWS] += half * length * shape.states.strains_by[i, 3, : len(OF_LAWS)]
+                by[i, OF_LAWS] += half * length * shape.states.strains_by[i, 3]
                 by[i, FIELD_AT["width"]] += turn / 2
                 rows.append(half * turn)
                 slopes.append(self.columns(by, 0))

@@ -1,7 +1,7 @@
 """The design space: start dimensions, what varies in each kind of segment, and how far it may."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -36,14 +36,21 @@ RANGES: dict[str, dict[str, tuple[Range, float]]] = {
     },
     PASSIVE: {"plain_length": ((3, 500), 5.0), "base_thickness": ((1, 5), 1.5)},
 }
-UNITS = {"pressure": (" kPa", KPA_PER_MPA), "angle": (" deg", 1.0), "chambers": ("", 1.0)}
+#: what a caster's thinnest and thickest wall is asked of
+WALLS = ("wall", "top_wall", "side_wall", "roof")
+UNITS = {
+    "pressure": (" kPa", KPA_PER_MPA),
+    "mu": (" MPa", 1.0),
+    "angle": (" deg", 1.0),
+    "chambers": ("", 1.0),
+}
 
 
 @dataclass(frozen=True)
 class Variable:
     """A design variable of some segments: its field (reduced.rod.piece_slopes.FIELDS), range, what counts as
     a large change, and the value it is drawn to where the target does not decide; of a pressure, the aims
-    that it is meant for."""
+    that it is meant for, and the number of its group of segments where there are several."""
 
     name: str
     segments: tuple[int, ...]
@@ -52,11 +59,14 @@ class Variable:
     scale: float
     start: float | None = None
     aims: tuple[int, ...] = (0,)
+    group: int = 0
 
     @property
     def title(self) -> str:
         """As users read it; of several segments at once, without their numbers."""
-        alone = len(self.segments) == 1 and self.name != "pressure"
+        if self.group:
+            return f"{self.name} of group {self.group}"
+        alone = len(self.segments) == 1 and self.name not in ("pressure", "mu")
         return f"segment {self.segments[0] + 1} {self.name}" if alone else self.name
 
     def bound(self, value: float) -> float | None:
@@ -81,12 +91,19 @@ def prototype(target: Target, piece: Extracted) -> Segment:
     of_chambers = TWISTING if kind == TWISTING else ONE_SIDED
     try:
         segment = Segment(
-            of_chambers, 90.0, 1, **(START[of_chambers] | target.start), material=target.material
+            of_chambers, 90.0, 1, **(_start(of_chambers, target) | target.start), material=target.material
         )
-        segment = replace(segment, roll=round(piece.roll))
+        segment = replace(segment, roll=round(piece.roll), group=piece.group)
         return segment.plain(piece.length) if kind == PASSIVE else segment
     except InputError as error:
         raise InputError(f"[segment] (start dimensions of the {kind} segments): {error}") from None
+
+
+def _start(kind, target):
+    """Start dimensions of a kind, with walls that can be cast."""
+    start, walls = START[kind], target.casting.walls
+    usual = {f.name: f.default for f in fields(Segment)} | start
+    return start | {name: float(np.clip(usual[name], *walls)) for name in WALLS}
 
 
 def limits(target: Target, piece: Extracted, segment: Segment) -> dict[str, tuple[Range, float]]:
@@ -132,6 +149,11 @@ def variables_of(
     if any(segments[i].kind == ONE_SIDED for i, *_ in base):
         members, lows, highs, scales, starts = zip(*base)
         found.append(Variable("base_thickness", members, max(lows), min(highs), scales[0], starts[0]))
+    if target.casting.moduli is not None:
+        low, high = target.casting.moduli
+        if high > low:
+            everywhere = tuple(range(len(segments)))
+            found.append(Variable("mu", everywhere, low, high, (high - low) / 2, target.material.mu))
     return found
 
 

@@ -34,6 +34,11 @@ class Effect:
     rms: float
     tip: float
 
+    def __str__(self) -> str:
+        where = "" if self.segment is None else f"segment {self.segment} "
+        what = self.name.rsplit("_", 1)[0]
+        return f"{where}{what} {self.change}: {self.rms:.2f} mm RMS, {self.tip:.2f} mm at the tip"
+
 
 @dataclass(frozen=True)
 class Tolerances:
@@ -82,10 +87,13 @@ def tolerances(body: Body, shape: Shape, casting: Casting, law: SegmentLaw) -> T
             elif moves.any():
                 add(f"{name}_mm", i + 1, "0.1 mm", moves, PER_LENGTH, casting.tolerance)
     by_pressure = shape.moves[:, :, :, FIELD_AT["pressure"]]
-    moves = by_pressure.sum(axis=2)
-    add("pressure_kPa", None, "1 kPa", moves, PER_PRESSURE * MPA_PER_KPA, casting.pressure_tolerance)
-    # strains depend on the pressure over the modulus
-    moves = -by_pressure @ body.pressures[0]
+    groups = sorted({segment.group for segment in body.segments})
+    for group in groups:
+        members = [i for i, segment in enumerate(body.segments) if segment.group == group]
+        moves = by_pressure[:, :, members].sum(axis=2)
+        name = "pressure_kPa" if len(groups) == 1 else f"pressure_group_{group}_kPa"
+        add(name, None, "1 kPa", moves, PER_PRESSURE * MPA_PER_KPA, casting.pressure_tolerance)
+    moves = shape.moves[:, :, :, FIELD_AT["mu"]] @ [s.material.mu for s in body.segments]
     add("mu_MPa", None, "1 %", moves, PER_MODULUS, casting.modulus_tolerance)
     rms, tip = np.sqrt(variances)
     return Tolerances(tuple(effects), float(rms), float(tip), *_of_the_law(body, shape, law))

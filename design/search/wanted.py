@@ -58,6 +58,8 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
 def _given_or_found(target, law):
     if target.pieces and not target.split.refine:
         return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
+    if any(piece.group > 1 for piece in target.pieces):
+        raise InputError("[split] refine: pieces of several pressure groups are not refined: leave it out")
     tolerance, options = target.split.tolerance, target.split
     if tolerance is None:
         tolerance = (LOADED_TOLERANCE if any(target.gravity) else TOLERANCE) * _chords(target)

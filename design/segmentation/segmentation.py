@@ -11,7 +11,10 @@ from pneunet.design.target.file import PIECE_KEYS
 from pneunet.design.target.target import Piece
 
 #: of a [[piece]] table, in the order in which they are written
-KEYS = ("kind", "length_mm", "roll_deg", "curvature_per_m", "tau_rad_per_mm", "torsion_rad_per_m")
+KEYS = (
+    *("kind", "length_mm", "pressure_group", "roll_deg"),
+    *("curvature_per_m", "tau_rad_per_mm", "torsion_rad_per_m"),
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -41,8 +41,8 @@ class Extracted:
     """What one segment is to do, per deformed length: length mm, twist (tau or torsion) rad/mm, curvature
     1/mm.
 
-    roll in degrees, as a Piece's. twist_seen: the points (or frames) determine the twist. fit_rms: mm between
-    the points and the piece of uniform rates. note: what had to be assumed.
+    roll in degrees and group as a Piece's. twist_seen: the points (or frames) determine the twist. fit_rms:
+    mm between the points and the piece of uniform rates. note: what had to be assumed.
     """
 
     kind: str
@@ -53,6 +53,7 @@ class Extracted:
     twist_seen: bool = True
     note: str = ""
     roll: float = 0.0
+    group: int = 1
 
     @property
     def strains(self) -> RodStrains:
@@ -64,6 +65,8 @@ class Extracted:
         out = {"kind": self.kind, "length_mm": self.length} | rates(self.kind, self.strains)
         if self.roll:
             out["roll_deg"] = self.roll
+        if self.group > 1:
+            out["pressure_group"] = self.group
         return out | {"fit_rms_mm": self.fit_rms} | ({"note": self.note} if self.note else {})
 
 
@@ -160,7 +163,7 @@ def extract(target: Target, pieces: Sequence[Piece]) -> list[Extracted]:
         if target.frames is None:
             for i, extracted in zip(run, _twist_of_run(target, pieces, arcs, run)):
                 out[i] = extracted
-    return out
+    return [replace(one, group=p.group) for one, p in zip(out, pieces)]
 
 
 def _kept(piece):

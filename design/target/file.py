@@ -1,9 +1,8 @@
-"""Reading a `Target` from a CSV of points or a TOML; docs/use-targets.md shows the files.
+"""Reading a `Target` from a CSV of points or a TOML; docs/use-design.md shows the files.
 
 Every bad input is one line that names the key and the fix.
 """
 
-import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,9 +29,7 @@ from pneunet.design.target.target import (
     Target,
 )
 from pneunet.design.target.wrapfile import wrapped
-from pneunet.geometry.parameters import TWISTING, Segment
-
-log = logging.getLogger(__name__)
+from pneunet.geometry.parameters import MOST_GROUPS, TWISTING, Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
@@ -75,8 +72,8 @@ def _target(where, **values):
 CURVES = ("points", "points_mm", "wrap")
 SHAPE_KEYS = (*CURVES, "frames", "weights", "pressure_kPa")
 KEYS = (
-    *("name", "target", *SHAPE_KEYS, "pressure_range_kPa", "gravity_m_per_s2", "shape", "tip_points"),
-    *("piece", "base", "material", "casting", "segment", "split", "vary"),
+    *("name", "target", *SHAPE_KEYS, "pressure_range_kPa", "pressure_groups", "gravity_m_per_s2"),
+    *("shape", "tip_points", "piece", "base", "material", "casting", "segment", "split", "vary"),
 )
 
 
@@ -116,6 +113,7 @@ def _from_toml(path):
         base_width=width,
         pressure_range=pressure_range,
         pressures=pressures,
+        groups=_groups(table, where),
         gravity=_gravity(table, where),
         shapes=tuple(_shape(row, folder, f"{where} [[shape]] {i}") for i, row in enumerate(shapes, start=1)),
         tip=tip,
@@ -249,12 +247,7 @@ def _casting(table, where):
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise InputError(f"{where}: 'silicones' must be a list of names, not {shown(names)}")
     refuse_unknown(table, (*quantities(Casting), *RANGES, "silicones"), where)
-    casting = from_table(Casting, table, where, silicones=tuple(names), **given)
-    if casting.silicones or casting.moduli is not None:
-        log.warning(
-            f"warning: {where}: the search does not choose a silicone yet: that of [material] is taken"
-        )
-    return casting
+    return from_table(Casting, table, where, silicones=tuple(names), **given)
 
 
 def _array(value, key, where, dimensions):
@@ -295,6 +288,14 @@ def _pressure(table, where):
     return (pressures[0], pressures[-1]), ()
 
 
+def _groups(table, where):
+    count = table.get("pressure_groups", 1)
+    if type(count) is not int or not 1 <= count <= MOST_GROUPS:
+        told = f"pressure_groups = {shown(count)}"
+        raise InputError(f"{where}: {told} must be a whole number, 1..{MOST_GROUPS}")
+    return count
+
+
 def _range(value, key, where):
     if not isinstance(value, list) or len(value) != 2:
         raise InputError(f"{where}: '{key}' must be [smallest, largest], not {value!r}")
@@ -305,12 +306,13 @@ def _range(value, key, where):
 
 
 PIECE_KEYS = {
-    PASSIVE: ("kind", "length_mm"),
-    TWISTING: ("kind", "length_mm", "tau_rad_per_mm"),
-    BENDING: ("kind", "length_mm", "roll_deg", "curvature_per_m"),
+    PASSIVE: ("kind", "length_mm", "pressure_group"),
+    TWISTING: ("kind", "length_mm", "pressure_group", "tau_rad_per_mm"),
+    BENDING: ("kind", "length_mm", "pressure_group", "roll_deg", "curvature_per_m"),
     HELICAL: (
         "kind",
         "length_mm",
+        "pressure_group",
         "roll_deg",
         "cylinder_curvature_per_m",
         "pitch_mm",
@@ -339,13 +341,14 @@ class _Given(Checked):
     cylinder_curvature: float | None = quantity("per_m", None, above=0, low=1e-6, high=2e3)
     pitch: float | None = quantity("mm", None, low=-1e5, high=1e5)
     roll: float = quantity("deg", 0.0, low=0, high=270)
+    group: int = quantity(None, 1, key="pressure_group", low=1, high=MOST_GROUPS)
 
 
 def _piece(row, where):
     given = from_table(_Given, row, where)
     refuse_unknown(row, PIECE_KEYS[given.kind], where)
     curvature, twist = (given.curvature, given.twist) if given.kind != HELICAL else _helix(given, where)
-    return Piece(given.kind, given.length, twist, curvature, given.roll)
+    return Piece(given.kind, given.length, twist, curvature, given.roll, given.group)
 
 
 def _helix(given, where):

@@ -8,7 +8,7 @@ import numpy as np
 
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
-from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic
+from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, of_modulus, silicone
 from pneunet.base.quantities import Checked, quantity
 from pneunet.design.target.casting import Casting
 from pneunet.design.target.points import checked_frames, checked_points, checked_weights
@@ -29,6 +29,7 @@ class Piece:
     length in mm; twist in rad/mm: the twist tau of a twisting piece, the torsion of a helical one; curvature
     in 1/mm (Frenet's). None = to be extracted from the points. roll in degrees: by how much the piece is
     turned about the axis against the section frame that runs through all pieces; 180 bends to the other side.
+    group: number of the group of segments that share its pressure.
     """
 
     kind: str
@@ -36,6 +37,7 @@ class Piece:
     twist: float | None = None
     curvature: float | None = None
     roll: float = 0.0
+    group: int = 1
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class Target:
     its roll stays free, both None = it is free to turn); gravity (3,): acceleration in mm/s2, in the target's
     coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of several groups of
     segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip: `TipPoints` as the
-    pressure rises; material; casting: what can be cast; start: {field of Segment: mm}; vary: {field of
+    pressure rises; material; casting: what can be cast; groups: how many pressures
+    there are, where pieces do not say; start: {field of Segment: mm}; vary: {field of
     Segment: (low, high)} or None for the default choice; split: how it is split; source: name of the file
     that it was read from.
     """
@@ -83,6 +86,7 @@ class Target:
     shapes: tuple[TargetShape, ...] = ()
     tip: TipPoints | None = None
     casting: Casting = Casting()
+    groups: int = 1
 
     @classmethod
     def read(cls, path: str | Path) -> "Target":
@@ -110,6 +114,17 @@ class Target:
     def __repr__(self) -> str:
         told = f"{len(self.points)} points{' with frames' * (self.frames is not None)}, {self.length:.1f} mm"
         return f"<Target {self.name}: {told}{f', {len(self.pieces)} pieces' if self.pieces else ''}>"
+
+    @property
+    def materials(self) -> tuple[Hyperelastic, ...]:
+        """Those to choose among: the silicones that may be cast, else the target's own."""
+        return tuple(map(silicone, self.casting.silicones)) or (self.material,)
+
+    @property
+    def softest(self) -> Hyperelastic:
+        """What reaches farthest of all that may be chosen."""
+        material = min(self.materials, key=lambda m: m.mu)
+        return of_modulus(material, self.casting.moduli[0]) if self.casting.moduli else material
 
     @property
     def length(self) -> float:

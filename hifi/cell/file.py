@@ -109,7 +109,8 @@ def cell_from_tables(data: dict[str, Any], where: str) -> CellCase:
 
 
 def cell_tables(case: CellCase) -> dict[str, Any]:
-    """The complete tables of a CellCase, which cell_from_tables reads back."""
+    """The complete tables of a CellCase, which cell_from_tables reads back. The usual element is not written:
+    cases that were finished before there was a choice keep their names."""
     segment = case.segment
     tables = to_table(case) | {
         "material": material_to_table(segment.material),
@@ -118,4 +119,6 @@ def cell_tables(case: CellCase) -> dict[str, Any]:
     }
     if segment.layer_material is not None:
         tables["layer_material"] = material_to_table(segment.layer_material)
+    if case.element == "tetrahedra":
+        del tables["element"]
     return tables

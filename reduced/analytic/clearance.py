@@ -52,11 +52,12 @@ def gap_left(segment: Segment, pressure: float) -> float:
 
 
 def gap_left_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
-    """(the same, its derivatives (14,) by the lengths of geometry.shape_numbers.SHAPE, in degrees and mm, and
-    by the pressure in MPa)."""
+    """(the same, its derivatives (15,) by geometry.shape_numbers.SHAPE, in degrees and mm, and by the
+    pressure and the modulus in MPa)."""
     bulge, by_height, by_length, by_wall, by_pressure = _bulge(segment, pressure)
+    by_mu = -pressure / segment.material.mu * by_pressure  # the load is their ratio
     by_angle = -by_length * segment.cavity_width * segment.cot / segment.sin * np.radians(1.0)
     by = {"chamber_height": by_height, "wall": by_wall, "angle": by_angle, "gap": -0.5}
     by |= {"width": by_length / segment.sin, "side_wall": -2 * by_length / segment.sin}
-    slopes = np.array([by.get(name, 0.0) for name in SHAPE] + [by_pressure])
+    slopes = np.array([by.get(name, 0.0) for name in SHAPE] + [by_pressure, by_mu])
     return segment.gap - 2 * bulge, -2 * slopes

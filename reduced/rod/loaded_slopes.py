@@ -13,6 +13,7 @@ import numpy as np
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.materials.laws import of_modulus
 from pneunet.base.strains import RodStrains
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import PASSIVE, Segment
@@ -25,7 +26,7 @@ from pneunet.reduced.rod.rod import Rod, rod_pieces
 
 #: of the length: what elements may leave
 TOLERANCE = 1e-4
-#: mm, degrees, of a number of chambers; MPa: of the differences
+#: mm, degrees, of a number of chambers, MPa of a modulus; MPa of a pressure: of the differences
 STEP, PRESSURE_STEP = 1e-3, 2e-5
 #: of FIELDS, those that no section depends on
 OF_LENGTHS = ("plain_length", "chambers")
@@ -135,6 +136,8 @@ class _Balance:
             count = count + step
         elif name == "pressure":
             P = P + step
+        elif name == "mu":
+            segment = replace(segment, material=of_modulus(segment.material, segment.material.mu + step))
         else:
             segment = replace(segment, **{name: getattr(segment, name) + step})
         if name in OF_LENGTHS:  # sections stay as they are

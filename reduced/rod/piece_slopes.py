@@ -13,13 +13,13 @@ from pneunet.geometry.sections import rotation
 from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.states import StatesWithSlopes
+from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
 
-#: what the derivatives are by, in order: degrees, mm, mm, mm, -, MPa
-FIELDS = (*SHAPE, "end_margin", "plain_length", "chambers", "pressure")
+#: what the derivatives are by, in order: degrees, mm, mm, mm, -, MPa, MPa
+FIELDS = (*SHAPE, "end_margin", "plain_length", "chambers", "pressure", "mu")
 FIELD_AT = {name: i for i, name in enumerate(FIELDS)}
-#: of the shape and the pressure, which are what laws give slopes by
-OF_LAWS = [FIELD_AT[name] for name in (*SHAPE, "pressure")]
+#: of what laws give slopes by
+OF_LAWS = [FIELD_AT[name] for name in VARIABLES]
 #: of the normal pitch by some of them
 PITCH_BY = {"cavity_thickness": 1.0, "wall": 2.0, "gap": 1.0}
 _OF_PITCH = [FIELD_AT[name] for name in PITCH_BY]
@@ -49,7 +49,7 @@ def piece_twists(
     """(twists (3 n, 6) = (k, e) times length of the pieces of n segments in the body's axes, derivatives
     (3 n, 6, fields) by FIELDS of their own segment).
 
-    free (n, 6), slopes (n, 6, 14): strains of the cells, derivatives by OF_LAWS; counts (n,): real numbers of
+    free (n, 6), slopes (n, 6, 15): strains of the cells, derivatives by OF_LAWS; counts (n,): real numbers of
     chambers.
     """
     lengths, strains = free_pieces(segments, RodStrains.of_vector(free), counts)

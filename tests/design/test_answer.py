@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
 from pneunet.cli import NOT_FOLLOWED, main
-from pneunet.design.inverse_design import answer, inverse_design
+from pneunet.design.inverse_design import answer, inverse_design, summary, wrapped
+from pneunet.design.search.groups import divided
 from pneunet.design.search.inverse import search
 from pneunet.design.target.casting import Casting
-from pneunet.design.target.extraction import extract
+from pneunet.design.target.extraction import Extracted, extract
 from pneunet.design.target.shapes import TargetShape
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import read_design_file
@@ -75,6 +78,13 @@ def test_tolerances_are_what_small_changes_do():
     moved = predict(thicker, design.content.pressure, ToyLaw(), base_pose=design.content.base_pose)
     away = np.linalg.norm(moved.points[-1] - design.prediction.points[-1])
     assert effects["base_thickness_mm", 1].tip == pytest.approx(100 * away, rel=0.02)
+    soft = of_modulus(PAPER_TWISTING, 0.999 * PAPER_TWISTING.mu)
+    softer = tuple(replace(s, material=soft) for s in design.manipulator.segments)
+    moved = predict(
+        Manipulator(softer), design.content.pressure, ToyLaw(), base_pose=design.content.base_pose
+    )
+    away = np.linalg.norm(moved.points[-1] - design.prediction.points[-1])
+    assert effects["mu_MPa", None].tip == pytest.approx(10 * away, rel=0.02)
     told = Casting()
     expected = 0.0
     for e in effects.values():
@@ -94,6 +104,74 @@ def test_an_answer_in_plain_words(tmp_path, capsys):
     assert "NOT followed: " in capsys.readouterr().out
     assert not result["followed"] and result["tolerances"]["casting_rms_mm"] > 0
     line, pieces = made(PAIR)
-    last = list(answer(inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())))
+    design = inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())
+    lines = list(wrapped((*summary(design), *answer(design))))
+    assert max(map(len, lines)) <= 100
+    assert lines[lines.index("what moves it most:") + 1].startswith("  segment ")
+    last = list(answer(design))
     assert last[0].startswith("followed: RMS") and "law 'toy' does not know" in last[1]
     assert last[2].startswith("ASSUMED silicone: paper, twisting theory, mu = 0.317 MPa")
+
+
+def test_the_silicone_is_chosen_from_a_list_or_a_range():
+    soft, stiff = silicone("Dragon Skin 10 MEDIUM"), silicone("Dragon Skin 30")
+    line, pieces = made(tuple(replace(s, material=stiff) for s in PAIR), 0.05)
+    target = Target(line.points, pieces=pieces, pressure_range=(0.05, 0.05), **BASE)
+    listed = replace(target, casting=Casting(silicones=(soft.name, stiff.name)))
+    design = inverse_design(listed, law=ToyLaw())
+    assert {s.material for s in design.manipulator.segments} == {stiff}
+    assert design.content.result["silicone"] == stiff.name
+    assert list(answer(design))[2].startswith("chosen of 2 silicones: Dragon Skin 30, mu = ")
+    # dimensions fixed: the modulus alone makes up for the pressure
+    dimensions = {"base_thickness": 2.0, "chamber_height": 4.0}
+    body = tuple(replace(s, **dimensions, material=of_modulus(PAPER_TWISTING, 0.2)) for s in PAIR)
+    line, pieces = made(body, 0.03)
+    target = Target(line.points, pieces=pieces, pressure_range=(0.03, 0.03), vary={}, **BASE)
+    ranged = replace(target, casting=Casting(moduli=(0.1, 0.5)))
+    found = search(ranged, extract(ranged, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
+    assert [s.material.mu for s in found] == pytest.approx([0.2, 0.2], rel=0.02)
+
+
+def test_a_limit_below_the_pressure_is_said():
+    weak = replace(PAPER_TWISTING, elongation_at_break=0.001)
+    line, pieces = made(PAIR, 0.05)
+    target = Target(line.points, pieces=pieces, material=weak, pressure_range=(0.05, 0.05), **BASE)
+    told = inverse_design(target, law=ToyLaw(limit=0.06)).content.result["pressure_limits"]
+    assert "(EXCEEDED): walls of segment " in told[0] and "elongation at break" in told[0]
+    gives_way = next(text for text in told if text.endswith("the law finds no equilibrium beyond"))
+    assert float(gives_way.split()[0]) == pytest.approx(60, abs=0.6)
+
+
+def test_walls_are_within_what_is_cast():
+    line, pieces = made(PAIR)
+    target = Target(line.points, pieces=pieces, casting=Casting(walls=(1.4, 1.8)), **BASE)
+    for s in search(target, extract(target, pieces), ToyLaw(), alternatives=0).best.manipulator.segments:
+        assert all(1.4 <= wall <= 1.8 for wall in (s.wall, s.top_wall, s.side_wall, s.roof))
+
+
+def test_each_group_of_segments_has_a_pressure_of_its_own(tmp_path):
+    body = (PAIR[0], replace(PAIR[1], chamber_height=4.0, base_thickness=2.4, group=2))
+    line, pieces = made(body, (0.045, 0.02))
+    pieces = (pieces[0], replace(pieces[1], group=2))
+    low = predict(Manipulator(body), (0.02, 0.03), ToyLaw(), 0.5)
+    # the dimensions are known: only pressures make up for it
+    target = Target(line.points, pieces=pieces, vary={}, start={"base_thickness": 2.4}, **BASE)
+    target = replace(target, shapes=(TargetShape(low.points, (0.02, 0.03)),))
+    # which segments share one is found where nobody says
+    unsaid = replace(target, pieces=tuple(replace(p, group=1) for p in pieces), groups=2)
+    free = inverse_design(unsaid, law=ToyLaw())
+    assert free.content.pressure == pytest.approx((0.045, 0.02), rel=0.01)
+    fixed = inverse_design(replace(target, pressures=(0.045, 0.02)), law=ToyLaw())
+    for design in (free, fixed):
+        assert design.errors.rms < 0.3 and design.further_errors[0].rms < 0.3
+    assert fixed.content.pressure == (0.045, 0.02)
+    names = [e.name for e in free.tolerances.effects][-3:]
+    assert names == ["pressure_group_1_kPa", "pressure_group_2_kPa", "mu_MPa"]
+    folder = free.save(tmp_path / "out")
+    assert [p.group for p in Target.read(folder / "split.toml").pieces] == [1, 2]
+    with pytest.raises(InputError, match="3 pressures need as many pieces that bend or twist, not 2"):
+        inverse_design(replace(unsaid, pressures=(0.03, 0.02, 0.01)), law=ToyLaw())
+    five = [Extracted("bending", 30.0, 0.0, 0.01, 0.0)] * 2 + [Extracted("passive", 9.0, 0.0, 0.0, 0.0)]
+    found = divided(replace(unsaid, groups=2), five + five[:1] * 2)
+    groups = [[p.group for p in parts] for parts in found]
+    assert groups == [[1, 2, 2, 2, 2], [1, 1, 1, 2, 2], [1, 1, 1, 1, 2]]

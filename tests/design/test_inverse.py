@@ -102,6 +102,10 @@ def test_frames_are_followed():
     solution, errors, found = designed(target)
     assert errors.rms < 0.2
     assert np.allclose(found.poses[-1, :3, :3], line.poses[-1, :3, :3], atol=0.05)
+    # frames that lean cannot be met: they are in what is minimised, not in the centreline's error
+    leaning = replace(target, frames=target.frames @ se3.exp_rotation(np.array([0, 0, 0.05])))
+    solution, errors, _ = designed(leaning)
+    assert solution.rms > 2 * errors.rms and solution.centreline_rms == pytest.approx(errors.rms, rel=0.05)
 
 
 def test_active_bounds_are_named_with_what_they_cost():

@@ -9,6 +9,7 @@ from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
 
 #: what its strains depend on besides the pressure, and an imaginary step for derivatives
 OF_SHAPE, STEP = ("angle", "chamber_height", "base_thickness"), 1e-30j
+MU = 0.317  # MPa, of the paper's silicone: loads are pressures over the modulus
 
 
 class ToyLaw(SegmentLaw):
@@ -23,18 +24,20 @@ class ToyLaw(SegmentLaw):
     def each_with_slopes(self, segments, pressure, names=SHAPE):
         pressures = np.broadcast_to(pressure, len(segments))
         q, slopes = self.each(segments, pressures).vector, np.zeros((len(segments), 6, len(VARIABLES)))
-        places = [VARIABLES.index(name) for name in (*OF_SHAPE, "pressure")]
+        places = [VARIABLES.index(name) for name in (*OF_SHAPE, "pressure", "mu")]
         for segment, P, rows in zip(segments, pressures, slopes):
-            values = np.array([*(getattr(segment, name) for name in OF_SHAPE), P], complex)
+            values = np.array(
+                [*(getattr(segment, name) for name in OF_SHAPE), P, segment.material.mu], complex
+            )
             for j, place in enumerate(places):
-                stepped = values + STEP * np.eye(4)[j]
+                stepped = values + STEP * np.eye(5)[j]
                 rows[:, place] = strains(segment.kind, *stepped).imag / STEP.imag
         return StatesWithSlopes.of_strains(q, slopes)
 
 
-def strains(kind, angle, chamber_height, base_thickness, P):
+def strains(kind, angle, chamber_height, base_thickness, P, mu):
     """(6,)"""
-    angle, load = angle * np.pi / 180, P / 0.05
+    angle, load = angle * np.pi / 180, P / 0.05 * MU / mu
     if kind == "twisting":
         k1 = 0.035 * load * np.sin(2 * angle) * (chamber_height / 5.5) ** 0.5
         return np.array([1 + 0.1 * load, 0, 0, k1, 0, 0])
@@ -52,4 +55,4 @@ class ToySection(FreeSection):
         if P > self.limit:
             raise ConvergenceError(f"toy law: no equilibrium beyond {1e3 * self.limit:g} kPa")
         segment = self.segment
-        return strains(segment.kind, *(getattr(segment, name) for name in OF_SHAPE), P)
+        return strains(segment.kind, *(getattr(segment, name) for name in OF_SHAPE), P, segment.material.mu)

@@ -72,7 +72,7 @@ def test_without_dashes_it_is_a_subcommand_of_pneunet():
 def test_what_knows_no_ranks_is_refused_on_several():
     assert launch.command_line(1, ["mesh", "design.toml"])[4:] == ["mesh", "design.toml"]
     with pytest.raises(
-        InputError, match="run: mesh works on one rank: leave out run -n 2, which is for 'solve', "
+        InputError, match="run: mesh works on one rank: leave out run -n 2, which is for 'design', 'solve', "
     ):
         launch.command_line(2, ["mesh", "design.toml"])
     assert set(launch.PARALLEL) < set(COMMANDS)

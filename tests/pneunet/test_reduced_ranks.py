@@ -1,4 +1,4 @@
-"""`pneunet workspace` on several ranks: the same shapes as in one process, and files that say so."""
+"""`pneunet workspace` and `pneunet design` on several ranks: the same as in one process."""
 
 import csv
 import subprocess
@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pneunet.design.inverse_design import inverse_design
 from pneunet.design.workspace import workspace
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING
 
@@ -31,3 +32,13 @@ def test_all_ranks_compute_the_same(tmp_path):
     assert (
         float(bending["torsion_rad_per_m"]) == pytest.approx(0, abs=1e-6) and bending["tau_rad_per_mm"] == ""
     )
+
+
+def test_a_design_is_the_same_on_any_ranks(tmp_path):
+    (tmp_path / "vase.toml").write_text('target = "vase"\npressure_range_kPa = [5, 20]\n')
+    command = [PNEUNET, "run", "-n", "3", "design", "vase.toml", "-o", "three"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and done.stdout.count("ASSUMED silicone") == 1, done.stdout + done.stderr
+    inverse_design(tmp_path / "vase.toml").save(tmp_path / "alone")
+    one, three = ((tmp_path / name / "design.toml").read_text() for name in ("alone", "three"))
+    assert one == three
