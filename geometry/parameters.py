@@ -313,6 +313,8 @@ class Manipulator:
                 raise InputError(
                     f"segment {i} and {i + 1}: the channel of one does not fit into the core of the other"
                     + (f" when they are rolled by {a.roll} and {b.roll} deg" if a.roll != b.roll else "")
+                    + ": make channel_width_mm and channel_height_mm smaller, or the core thicker"
+                    " (base_thickness_mm, roof_mm)"
                 )
         self._check_groups()
 

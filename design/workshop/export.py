@@ -59,9 +59,9 @@ def write_pack(
                 record.append(_write(part, fresh))
                 parts.append(part)
         record.insert(0, _write(body_part(manipulator, moulds, folder), folder))
-        if any(
-            "undercut_mm2" not in facts for part, facts in zip(parts, record[1:]) if part.silicone is not None
-        ):
+        formed = [facts for part, facts in zip(parts, record[1:]) if part.silicone is not None]
+        undercut_seen = all("undercut_mm2" in facts for facts in formed)
+        if not undercut_seen:
             log.warning("warning: undercuts are not looked for: pip install 'pneunet[moulds]'")
         pack = Pack(design, moulds, parts, found, limits(design, law, solved), sensitive(design, law))
         write_moulds_picture(folder / "moulds.png", parts)
@@ -71,7 +71,8 @@ def write_pack(
         write_pdf(folder / "sheet.pdf", design, content)
         facts = {"moulds": to_table(moulds), "parts": record, "pours": _pours(pack)}
         write_text(folder / "pack.json", json.dumps(facts, indent=1) + "\n")
-    log.info(f"{len(parts)} moulds, closed; sheet: {folder / 'sheet.html'}, sheet.pdf")
+    checked = "closed, without undercut" if undercut_seen else "closed"
+    log.info(f"{len(parts)} parts to print, {checked}; sheet: {folder / 'sheet.html'}, sheet.pdf")
     return folder
 
 
