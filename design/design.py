@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 import scipy
 
+from pneunet.base.curve import Curve
 from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
@@ -18,7 +19,7 @@ from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
 from pneunet.design.segmentation.segmentation import piece_tables
-from pneunet.design.target.metrics import Errors, compare
+from pneunet.design.target.metrics import FOLLOWED, Errors, compare, paired_rms
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
 from pneunet.geometry.parameters import Manipulator
@@ -115,8 +116,13 @@ class Design:
 
     @property
     def followed(self) -> bool:
-        """Whether the prediction follows all of the target; true without one."""
-        return not any(e.not_followed for e in (self.errors, *self.further_errors) if e)
+        """Whether the prediction follows all of the target, the points of its tip included; true without
+        one. A curve that is but a guide need not be followed."""
+        if self.target is None:
+            return True
+        curves = (None if self.target.guided else self.errors, *self.further_errors)
+        missed = any(away > FOLLOWED * self.target.length for away in self.tip_errors)
+        return not missed and not any(e.not_followed for e in curves if e)
 
     @property
     def manipulator(self) -> Manipulator:
@@ -149,6 +155,24 @@ class Design:
         """How far the predictions are from the target's further shapes."""
         shapes = () if self.target is None else self.target.shapes
         return tuple(compare(line.points, s.curve) for line, s in zip(self.further_predictions, shapes))
+
+    @cached_property
+    def tip_errors(self) -> tuple[float, ...]:
+        """Distances (mm) of the predicted tip from the target's points of the tip, in their order."""
+        tip = None if self.target is None else self.target.tip
+        if tip is None:
+            return ()
+        ends = (self._predicted(P).points[-1] for P in tip.pressures.tolist())
+        return tuple(float(np.linalg.norm(end - point)) for end, point in zip(ends, tip.points))
+
+    @cached_property
+    def sag(self) -> float:
+        """RMS (mm) by which its own weight moves the body at the design's pressure; 0 without gravity."""
+        content = self.content
+        if not content.loads:
+            return 0.0
+        free = predict(self.manipulator, content.pressure, self.law, base_pose=content.base_pose)
+        return paired_rms(Curve(self.prediction.points), Curve(free.points))
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:

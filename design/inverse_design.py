@@ -4,12 +4,13 @@ import logging
 import textwrap
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError
+from pneunet.base.errors import InputError, located
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.schemas import STRAINS
 from pneunet.base.files.toml import to_table
@@ -24,7 +25,8 @@ from pneunet.design.search.inverse import Map, search
 from pneunet.design.search.tolerances import largest, tolerances
 from pneunet.design.search.wanted import wanted
 from pneunet.design.target.extraction import Extracted, rates
-from pneunet.design.target.target import Target
+from pneunet.design.target.metrics import FOLLOWED
+from pneunet.design.target.target import BENDING, HELICAL, Target
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import PASSIVE, TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
@@ -41,6 +43,8 @@ RATES = {
 ROUNDED = 0.98
 #: of a terminal
 COLUMNS = 100
+#: rad of torsion along a helical piece, below which it is told as what it is, bending
+FLAT = 1e-6
 #: dimensions that are named as those that move the shape most
 MOST = 4
 log = logging.getLogger(__name__)
@@ -74,7 +78,8 @@ def inverse_design(
     told += [f"  piece {i}: {describe(piece)}" for i, piece in enumerate(asked.pieces, start=1)]
     for text in wrapped((*told, *(f"  {note}" for note in asked.notes))):
         log.info(text)
-    found = search(target, asked.pieces, law, objective, mapping=mapping)
+    with located(target.source) if target.source else nullcontext():
+        found = search(target, asked.pieces, law, objective, mapping=mapping)
     best = found.best
     chosen = best.manipulator.segments[0].material
     target = replace(target, material=chosen)
@@ -104,8 +109,9 @@ def inverse_design(
             "flush_underside_costs_mm": round(found.flush_costs, 4),
             "target_error": design.errors.table() if design.errors else {},
             "shape_error": [e.table() for e in design.further_errors],
+            "tip_errors_mm": list(design.tip_errors),
             "tolerances": spread.table(),
-            "alternative": [_table(c) for c in found.alternatives],
+            "alternative": [_table(c, best) for c in found.alternatives],
             "piece": [
                 {**piece.table(), "predicted": predicted(piece.kind, RodStrains(e, k))}
                 for piece, e, k in zip(found.pieces, design.strains.e, design.strains.k)
@@ -115,16 +121,17 @@ def inverse_design(
     return design
 
 
-def _table(candidate):
-    """A Candidate in numbers, for result tables."""
+def _table(candidate, best):
+    """A Candidate in numbers, for result tables; of its segments what differs from the best one's."""
     segments, one = candidate.manipulator.segments, candidate.pressures.shape[1] == 1
+    pairs = [(to_table(s), to_table(b)) for s, b in zip(segments, best.manipulator.segments)]
     return {
         "rms_mm": round(candidate.centreline_rms, 4),
         "misfit_mm": round(candidate.rms, 4),
         "silicone": segments[0].material.name,
         "mu_MPa": round(segments[0].material.mu, 6),
         "pressure_kPa": (KPA_PER_MPA * candidate.pressures.squeeze(axis=1 if one else ())).round(3).tolist(),
-        "segment": [to_table(s) for s in segments],
+        "segment": [{k: v for k, v in own.items() if b.get(k) != v} for own, b in pairs],
     }
 
 
@@ -159,11 +166,14 @@ def run_design(
 
 def describe(piece: Extracted) -> str:
     """One line about an `Extracted` piece, in the field's units."""
-    table = piece.table()
+    kind, table = piece.kind, piece.table()
+    if kind == HELICAL and abs(piece.twist * piece.length) < FLAT:
+        kind = BENDING
+        table = rates(kind, piece.strains)
     rolled = f", rolled by {piece.roll:g} deg" * bool(piece.roll)
     told = [f"{name} {table[key]:.4g} {unit}" for key, (name, unit) in RATES.items() if key in table]
     note = f" ({piece.note})" if piece.note else ""
-    return f"{piece.kind:8s} {piece.length:6.1f} mm, {', '.join(told)}{rolled}{note}"
+    return f"{kind:8s} {piece.length:6.1f} mm, {', '.join(told)}{rolled}{note}"
 
 
 def predicted(kind: str, strains: RodStrains) -> dict[str, float]:
@@ -190,12 +200,15 @@ def summary(design: Design) -> Iterator[str]:
     length, seconds = f"undeformed length {design.manipulator.length:.1f} mm", design.effort["wall_seconds"]
     yield f"pressure {kPa(design.content.pressure)}, {length}, {seconds:.1f} s"
     if design.errors:
-        yield "errors of the reduced prediction:"
+        guided = design.target is not None and design.target.guided
+        yield f"errors of the reduced prediction{' against the guide, which need not be met' * guided}:"
         yield from ("  " + text for text in design.errors.lines())
     shapes = design.target.shapes if design.target else ()
     for i, (shape, e) in enumerate(zip(shapes, design.further_errors), start=1):
         told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
         yield f"shape {i} at {kPa(shape.pressures)}: {told}"
+    tips = zip(design.target.tip.pressures, design.tip_errors) if design.tip_errors else ()
+    yield from _listed("points of the tip", (f"at {kPa(float(P))}: {away:.3f} mm away" for P, away in tips))
     yield from _listed("active bounds", design.active_bounds or ["none"])
     if flush := design.content.result.get("flush_underside_costs_mm"):
         yield f"flush undersides cost {flush:.2f} mm ([casting] allow_steps = true allows steps)"
@@ -242,20 +255,31 @@ def answer(design: Design) -> Iterator[str]:
     if errors is None or spread is None or target is None:
         return
     rms = f"RMS {errors.rms:.2f} mm ({errors.percent(errors.rms):.2f} % of length)"
+    told, share = [rms], [f"{100 * errors.not_followed:.0f} % of length"]
+    if target.guided:
+        told, share = [], []
+    if design.tip_errors:
+        told.append(f"tip at most {max(design.tip_errors):.2f} mm from its points")
     if design.followed:
-        yield f"followed: {rms}; castings within the tolerances will be off by {spread.rms:.2f} mm RMS"
+        castings = f"castings within the tolerances will be off by {spread.rms:.2f} mm RMS"
+        yield f"followed: {'; '.join((*told, castings))}"
     else:
         of_its_own = "no bound stops it: few pieces of constant strain do not follow this curve"
-        stopped = design.stopped_by or of_its_own
-        yield f"NOT followed: {100 * errors.not_followed:.0f} % of length; {rms}; {stopped}"
+        stopped = [design.stopped_by or of_its_own]
+        if design.sag > FOLLOWED * target.length:
+            weight = (
+                f"its own weight bends it by {design.sag:.0f} mm RMS: shorter, stiffer or without gravity"
+            )
+            stopped = [weight, *filter(None, [design.stopped_by])]
+        yield f"NOT followed: {'; '.join((*share, *told, *stopped))}"
     if spread.law_rms is None or spread.law_tip is None:
         yield f"how far the real body may be: the law '{design.law.name}' does not know"
     else:
         rms, tip = np.hypot(spread.law_rms, spread.mesh_rms), np.hypot(spread.law_tip, spread.mesh_tip)
         yield (
             f"the real body may be {rms:.1f} mm RMS and {tip:.1f} mm at the tip from this prediction:"
-            f" {spread.law_tip:.1f} mm (90 % of cases) for the law, {spread.mesh_tip:.1f} mm for the mesh of"
-            " its cells, which is a little too stiff"
+            f" at the tip {spread.law_tip:.1f} mm (90 % of cases) for the law and {spread.mesh_tip:.1f} mm"
+            " for the mesh of its cells, which is a little too stiff"
         )
     silicone, casting = f"{target.material.name}, mu = {target.material.mu:.4g} MPa", target.casting
     if casting.silicones:

@@ -64,8 +64,7 @@ class Aim:
     @classmethod
     def all_of(cls, target: Target, width: float, objective: str = PAIRED) -> "tuple[Aim, ...]":
         """Its own curve, unless that is but a guide, then its further shapes, then where the tip is to be."""
-        own = target.weights is None or bool(target.weights.any())
-        aims = [cls.of(target, width, objective)] if own else []
+        aims = [] if target.guided else [cls.of(target, width, objective)]
         aims += [cls.of(shape, width, pressure=shape.pressures) for shape in target.shapes]
         if target.tip is not None:
             tip, last = target.tip, np.ones(1)

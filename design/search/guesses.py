@@ -59,7 +59,7 @@ def _guesses_at(target, pieces, prototypes, law):
         fixed = body.pressures(target.pressures)[None]
         return first_guesses(pieces, prototypes, angles, heights, fixed, law)
     low, high = target.pressure_range or (0.010, PRESSURE_LIMIT)
-    if target.weights is not None and not target.weights.any():  # the curve is a guide to the last tip point
+    if target.guided:  # the last tip point is where it leads
         low = high = max([max(s.pressures) for s in target.shapes] + _tip_pressures(target))
     pressures = (
         np.linspace(low, high, max(1, round((high - low) / 0.010)) + 1) if high > low else np.array([low])

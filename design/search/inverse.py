@@ -180,6 +180,7 @@ class _Search:
         alternatives = self._alternatives(best, whole, self.guesses, rivals)
         if alternatives and alternatives[0].rms < BETTER * best.rms:
             best, alternatives = alternatives[0], (best, *alternatives[1:])
+            log.info(f"another candidate wins:  {best}")
         touching = () if self.target.casting.allow_touch else _touching(best)
         return Found(
             best,
@@ -204,9 +205,13 @@ class _Search:
             + _angles(guesses[0].segments)
         )
         work = partial(_from_guess, self.target, self.pieces, self.law, self.floor)
-        best = None
-        for found in self.mapping(work, guesses[:STARTS]):
+        best, count = None, len(guesses[:STARTS])
+        if self.loaded:
+            log.info(f"under gravity every step balances the whole body: {count} starts at most, in order")
+        for number, found in enumerate(self.mapping(work, guesses[:STARTS]), start=1):
             self._keep(found)
+            told = "no equilibrium" if found is None else _told(*found)
+            log.info(f"start {number} of at most {count}: {told}")
             best = min(self.optima, key=lambda found: found[1].cost, default=None)
             if best and best[1].cost < (GOOD_ENOUGH * self.target.length) ** 2:
                 break

@@ -45,7 +45,7 @@ def reaches(target: Target, piece: Extracted, law: SegmentLaw) -> list[Reach]:
 
 
 def out_of_reach(target: Target, pieces: Sequence[Extracted], law: SegmentLaw) -> Iterator[str]:
-    """A line about each piece that asks for more than any of its `reaches`."""
+    """A line about each piece that alone, without its neighbours, exceeds all its `reaches`."""
     known: dict[str, list[Reach]] = {}
     for i, piece in enumerate(pieces, start=1):
         if piece.kind == PASSIVE:
@@ -54,8 +54,8 @@ def out_of_reach(target: Target, pieces: Sequence[Extracted], law: SegmentLaw) -
             known[piece.kind] = reaches(target, piece, law)
         share = min(float(most.share(piece.curvature, piece.twist)) for most in known[piece.kind])
         if share == np.inf:
-            yield f"piece {i} is out of reach: no allowed angle twists so much for its curvature"
+            yield f"piece {i} alone is out of reach: no allowed angle twists so much for its curvature"
         elif share > 1:
             kPa = KPA_PER_MPA * known[piece.kind][0].pressures[-1]
             told = f"{100 * share:.0f} % of the most that allowed dimensions do at {kPa:.3g} kPa"
-            yield f"piece {i} is out of reach: it asks for {told}"
+            yield f"piece {i} alone is out of reach: it asks for {told}"

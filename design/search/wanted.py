@@ -20,6 +20,7 @@ from pneunet.reduced.rod.laws import SegmentLaw
 
 GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"
 REFINED_NOTE = "split given by the user, refined"
+GUIDE_NOTE = "one piece for the points of the tip, at first along an arc to the farthest"
 #: of the length, by which a curve may leave its pieces unless the user says: bare ends of segments do so
 TOLERANCE = 1e-3
 #: the same under gravity, which bends a segment unevenly: what it does is for the search to find
@@ -57,7 +58,10 @@ def wanted(target: Target, law: SegmentLaw) -> Wanted:
 
 def _given_or_found(target, law):
     if target.pieces and not target.split.refine:
-        return Wanted(target, tuple(extract(target, target.pieces)), GIVEN_NOTE)
+        pieces = tuple(extract(target, target.pieces))
+        # what a file of points of the tip alone is read as
+        made = target.guided and [(p.kind, p.curvature) for p in target.pieces] == [(HELICAL, None)]
+        return Wanted(target, pieces, GUIDE_NOTE if made else GIVEN_NOTE)
     if any(piece.group > 1 for piece in target.pieces):
         raise InputError("[split] refine: pieces of several pressure groups are not refined: leave it out")
     tolerance, options = target.split.tolerance, target.split

@@ -137,6 +137,11 @@ class Target:
         return Curve(self.points)
 
     @property
+    def guided(self) -> bool:
+        """Whether the curve is but a guide, which no error counts against: every weight is 0."""
+        return self.weights is not None and not self.weights.any()
+
+    @property
     def base_rotation(self) -> np.ndarray | None:
         """Rotation (3, 3) of a base that is fixed altogether, else None."""
         along, across = self.base_direction, self.base_width

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from pneunet.base.materials.laws import PAPER_TWISTING
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report.labels import kPa, plain, segment_name
 from pneunet.design.search.tolerances import Effect
@@ -112,10 +113,13 @@ def _mix(pack):
     totals: dict[str, float] = {}
     for _, name, _, gram, casts in found:
         totals[name] = totals.get(name, 0.0) + gram * casts
-    told = "; ".join(f"{name} {plain(gram, 1)} g" for name, gram in totals.items())
+    told = "; ".join(f"{plain(gram, 1)} g of {name}" for name, gram in totals.items())
+    assumed = [m.name for m in pack.design.manipulator.materials if m.name == PAPER_TWISTING.name]
+    notes = [f"ASSUMED silicone, where nobody gave another: {name}." for name in assumed]
     return [
-        f"In all {told}, of which {plain(100 * pack.moulds.waste)} % stays in cup and vents. Of a silicone in"
-        " two parts these are both together, in the maker's ratio.",
+        *notes,
+        f"In all: {told}; of which {plain(100 * pack.moulds.waste)} % stays in cup and vents. Of a silicone"
+        " in two parts these are both together, in the maker's ratio.",
         SheetTable(["layer", "silicone", "mL a cast", "g a cast", "casts"], rows),
     ]
 

@@ -5,14 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
+from pneunet.base.files.toml import to_table
 from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
 from pneunet.cli import NOT_FOLLOWED, main
-from pneunet.design.inverse_design import answer, inverse_design, summary, wrapped
+from pneunet.design.design import Design
+from pneunet.design.inverse_design import answer, describe, inverse_design, summary, wrapped
 from pneunet.design.search.groups import divided
 from pneunet.design.search.inverse import search
+from pneunet.design.search.tolerances import Tolerances
 from pneunet.design.target.casting import Casting
 from pneunet.design.target.extraction import Extracted, extract
+from pneunet.design.target.metrics import paired
 from pneunet.design.target.shapes import TargetShape
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import read_design_file
@@ -67,9 +72,49 @@ def test_one_body_meets_two_shapes_at_their_pressures():
     assert design.content.result["shape_error"][0]["rms_mm"] == design.further_errors[0].rms
 
 
+def test_points_of_the_tip_are_told_each_at_its_pressure(tmp_path):
+    rows = [(P, *predict(Manipulator(PAIR[:1]), P / 1e3, ToyLaw()).points[-1]) for P in (20.0, 40.0)]
+    np.savetxt(tmp_path / "tip.csv", rows, "%.6f", ",", header="pressure_kPa,x_mm,y_mm,z_mm", comments="")
+    (tmp_path / "a.toml").write_text('tip_points = "tip.csv"\nbase = { direction = [1, 0, 0] }\n')
+    design = inverse_design(tmp_path / "a.toml", law=ToyLaw())
+    away = [
+        np.linalg.norm(
+            predict(design.manipulator, P / 1e3, ToyLaw(), base_pose=design.content.base_pose).points[-1]
+            - end
+        )
+        for P, *end in rows
+    ]
+    assert design.tip_errors == pytest.approx(away, abs=1e-5) and design.followed
+    lines = list(summary(design))
+    first = lines.index("points of the tip:") + 1
+    assert lines[first].startswith("  at 20 kPa: ") and lines[first + 1].startswith("  at 40 kPa: ")
+    assert next(answer(design)).startswith("followed: tip at most ")
+    assert "given by the user" not in design.content.result["split"]
+    flat = Extracted("helical", 95.0, 1e-12, 0.01, 0.0)
+    assert describe(flat).startswith("bending") and "pitch" not in describe(flat)
+    missed = replace(design.target.tip, points=design.target.tip.points + 9.0)
+    far = Design(design.content, ToyLaw(), replace(design.target, tip=missed), tolerances=design.tolerances)
+    assert not far.followed and next(answer(far)).startswith("NOT followed: tip at most ")
+
+
+def test_weight_that_bends_the_body_away_is_named():
+    free = Design.of(Manipulator(PAIR), pressure_kPa=30.0)
+    target = Target(free.prediction.points, gravity=(0.0, 0.0, 9810.0))
+    content = replace(free.content, loads=target.loads)
+    heavy = Design(content, free.law, target, tolerances=Tolerances((), 0.0, 0.0, None, None, 0.0, 0.0))
+    away = paired(Curve(heavy.prediction.points), Curve(free.prediction.points))
+    assert free.sag == 0 and heavy.sag == pytest.approx(np.sqrt(np.mean(away**2)))
+    assert not heavy.followed
+    assert f"its own weight bends it by {heavy.sag:.0f} mm RMS: " in next(answer(heavy))
+
+
 def test_tolerances_are_what_small_changes_do():
     line, pieces = made(PAIR)
     design = inverse_design(Target(line.points, pieces=pieces, **BASE), law=ToyLaw())
+    # alternatives say what differs from the design alone
+    for one, told in zip(design.alternatives, design.content.result["alternative"], strict=True):
+        for own, best, table in zip(one.manipulator.segments, design.manipulator.segments, told["segment"]):
+            assert to_table(best) | table == to_table(own) and "width_mm" not in table
     effects = {(e.name, e.segment): e for e in design.tolerances.effects}
     one = design.manipulator.segments[0]
     thicker = Manipulator(
@@ -171,6 +216,8 @@ def test_each_group_of_segments_has_a_pressure_of_its_own(tmp_path):
     assert [p.group for p in Target.read(folder / "split.toml").pieces] == [1, 2]
     with pytest.raises(InputError, match="3 pressures need as many pieces that bend or twist, not 2"):
         inverse_design(replace(unsaid, pressures=(0.03, 0.02, 0.01)), law=ToyLaw())
+    with pytest.raises(InputError, match=r"^arm.toml: pressure_kPa: "):
+        inverse_design(replace(unsaid, pressures=(0.03, 0.02, 0.01), source="arm.toml"), law=ToyLaw())
     five = [Extracted("bending", 30.0, 0.0, 0.01, 0.0)] * 2 + [Extracted("passive", 9.0, 0.0, 0.0, 0.0)]
     found = divided(replace(unsaid, groups=2), five + five[:1] * 2)
     groups = [[p.group for p in parts] for parts in found]

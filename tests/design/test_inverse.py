@@ -171,6 +171,6 @@ def test_what_no_allowed_dimensions_reach_is_said():
     pieces = [replace(like, curvature=c) for c in (0.9 * most, 1.5 * most)]
     pieces.append(Extracted("helical", 40.0, 0.03, 0.001, 0.0))
     assert list(out_of_reach(target, pieces, law)) == [
-        "piece 2 is out of reach: it asks for 150 % of the most that allowed dimensions do at 20 kPa",
-        "piece 3 is out of reach: no allowed angle twists so much for its curvature",
+        "piece 2 alone is out of reach: it asks for 150 % of the most that allowed dimensions do at 20 kPa",
+        "piece 3 alone is out of reach: no allowed angle twists so much for its curvature",
     ]
