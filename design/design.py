@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 import scipy
 
-from pneunet.base.curve import Curve
 from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
@@ -19,7 +18,7 @@ from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
 from pneunet.design.segmentation.segmentation import piece_tables
-from pneunet.design.target.metrics import FOLLOWED, Errors, compare, paired_rms
+from pneunet.design.target.metrics import FOLLOWED, Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
 from pneunet.geometry.parameters import Manipulator
@@ -164,15 +163,6 @@ class Design:
             return ()
         ends = (self._predicted(P).points[-1] for P in tip.pressures.tolist())
         return tuple(float(np.linalg.norm(end - point)) for end, point in zip(ends, tip.points))
-
-    @cached_property
-    def sag(self) -> float:
-        """RMS (mm) by which its own weight moves the body at the design's pressure; 0 without gravity."""
-        content = self.content
-        if not content.loads:
-            return 0.0
-        free = predict(self.manipulator, content.pressure, self.law, base_pose=content.base_pose)
-        return paired_rms(Curve(self.prediction.points), Curve(free.points))
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:

@@ -3,14 +3,14 @@
 import logging
 import textwrap
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError, located
+from pneunet.base.errors import ConvergenceError, InputError, located
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.schemas import STRAINS
 from pneunet.base.files.toml import to_table
@@ -93,6 +93,10 @@ def inverse_design(
     }
     spread = tolerances(best.at.body, best.at.shapes[0], target.casting, law)
     design = Design(content, law, target, found.active, effort, spread, found.alternatives, found.stopped_by)
+    if target.loads and not design.followed:
+        log.info("not followed: once more without gravity, to tell whether the weight is the cause")
+        cause = weight_told(asked.target, asked.pieces, law, objective, mapping)
+        design = replace(design, stopped_by=cause or found.stopped_by)
     tell_doubts(design.doubts, law, outside)
     content.result.update(
         {
@@ -119,6 +123,23 @@ def inverse_design(
         }
     )
     return design
+
+
+def weight_told(
+    target: Target, pieces: Sequence[Extracted], law: SegmentLaw, objective: str = PAIRED, mapping: Map = map
+) -> str:
+    """That its own weight keeps a body off a target with gravity, in words; "" where the search does not come
+    near without gravity either."""
+    try:
+        free = search(replace(target, gravity=(0.0, 0.0, 0.0)), pieces, law, objective, 0, mapping).best
+    except ConvergenceError:
+        return ""
+    if free.rms > FOLLOWED * target.length:
+        return ""
+    return (
+        f"its own weight is the cause: without gravity a body comes within {free.rms:.2g} mm RMS; make it"
+        " shorter, of a stiffer silicone, or give no gravity"
+    )
 
 
 def _table(candidate, best):
@@ -265,13 +286,7 @@ def answer(design: Design) -> Iterator[str]:
         yield f"followed: {'; '.join((*told, castings))}"
     else:
         of_its_own = "no bound stops it: few pieces of constant strain do not follow this curve"
-        stopped = [design.stopped_by or of_its_own]
-        if design.sag > FOLLOWED * target.length:
-            weight = (
-                f"its own weight bends it by {design.sag:.0f} mm RMS: shorter, stiffer or without gravity"
-            )
-            stopped = [weight, *filter(None, [design.stopped_by])]
-        yield f"NOT followed: {'; '.join((*share, *told, *stopped))}"
+        yield f"NOT followed: {'; '.join((*share, *told, design.stopped_by or of_its_own))}"
     if spread.law_rms is None or spread.law_tip is None:
         yield f"how far the real body may be: the law '{design.law.name}' does not know"
     else:

@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import to_table
 from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
 from pneunet.cli import NOT_FOLLOWED, main
 from pneunet.design.design import Design
-from pneunet.design.inverse_design import answer, describe, inverse_design, summary, wrapped
+from pneunet.design.inverse_design import answer, describe, inverse_design, summary, weight_told, wrapped
 from pneunet.design.search.groups import divided
-from pneunet.design.search.inverse import search
-from pneunet.design.search.tolerances import Tolerances
+from pneunet.design.search.inverse import _Search, search
 from pneunet.design.target.casting import Casting
 from pneunet.design.target.extraction import Extracted, extract
-from pneunet.design.target.metrics import paired
 from pneunet.design.target.shapes import TargetShape
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import read_design_file
@@ -97,15 +94,24 @@ def test_points_of_the_tip_are_told_each_at_its_pressure(tmp_path):
     assert not far.followed and next(answer(far)).startswith("NOT followed: tip at most ")
 
 
-def test_weight_that_bends_the_body_away_is_named():
-    free = Design.of(Manipulator(PAIR), pressure_kPa=30.0)
-    target = Target(free.prediction.points, gravity=(0.0, 0.0, 9810.0))
-    content = replace(free.content, loads=target.loads)
-    heavy = Design(content, free.law, target, tolerances=Tolerances((), 0.0, 0.0, None, None, 0.0, 0.0))
-    away = paired(Curve(heavy.prediction.points), Curve(free.prediction.points))
-    assert free.sag == 0 and heavy.sag == pytest.approx(np.sqrt(np.mean(away**2)))
-    assert not heavy.followed
-    assert f"its own weight bends it by {heavy.sag:.0f} mm RMS: " in next(answer(heavy))
+def test_weight_is_named_where_without_it_the_curve_is_followed():
+    line, pieces = made(PAIR)
+    target = Target(line.points, pieces=pieces, gravity=(0.0, 0.0, -9810.0), **BASE)
+    told = weight_told(target, extract(target, pieces), ToyLaw())
+    assert told.startswith("its own weight is the cause: without gravity a body comes within 0.")
+    weak = replace(target, pressure_range=(0.005, 0.005))  # never near, with or without it
+    assert weight_told(weak, extract(weak, pieces), ToyLaw()) == ""
+
+
+def test_that_another_candidate_won_is_said(monkeypatch, caplog):
+    line, pieces = made(PAIR)
+    target = Target(line.points, pieces=pieces, **BASE)
+    better = lambda self, best, *others: (replace(best, rms=best.rms / 2),)  # noqa: E731
+    monkeypatch.setattr(_Search, "_alternatives", better)
+    with caplog.at_level("INFO", "pneunet"):
+        found = search(target, extract(target, pieces), ToyLaw())
+    assert found.alternatives[0].rms == 2 * found.best.rms
+    assert f"another candidate wins:  {found.best}" in caplog.messages
 
 
 def test_tolerances_are_what_small_changes_do():

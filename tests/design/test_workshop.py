@@ -10,8 +10,10 @@ import pneunet as pn
 from pneunet.cli import main
 from pneunet.design.workshop.limits import limits, wall_stretch
 from pneunet.design.workshop.sensitivity import sensitive
+from pneunet.design.workshop.sheet import Pack, sections
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.designfile import DesignFile, write_design_file
+from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced.analytic.clearance import gap_left
 from tests.design.toy_law import ToyLaw
@@ -84,3 +86,11 @@ def test_what_matters_most_comes_first():
     effects = sensitive(DesignFile(TWO, (0.004, 0.002)), ToyLaw())
     sizes = [e.rms for e in effects]
     assert 3 <= len(effects) <= 8 and sizes == sorted(sizes, reverse=True) and sizes[0] > 0
+
+
+def test_the_sheet_says_which_silicone_was_assumed():
+    body = Manipulator((Segment("one-sided", 90.0, 7),))
+    pack = Pack(DesignFile(body, 0.02), Moulds(), (), (), (), ())
+    assert dict(sections(pack))["Mix"][0].startswith("ASSUMED silicone, where nobody gave another: paper, ")
+    known = Manipulator((replace(body.segments[0], material=SILICONE),))
+    assert "ASSUMED" not in str(dict(sections(replace(pack, design=DesignFile(known, 0.02))))["Mix"])
