@@ -228,7 +228,8 @@ def summary(design: Design) -> Iterator[str]:
     for i, (shape, e) in enumerate(zip(shapes, design.further_errors), start=1):
         told = f"RMS {e.rms:.3f} mm ({e.percent(e.rms):.2f} % of length), tip {e.tip:.3f} mm"
         yield f"shape {i} at {kPa(shape.pressures)}: {told}"
-    tips = zip(design.target.tip.pressures, design.tip_errors) if design.tip_errors else ()
+    tip = design.target.tip if design.target else None
+    tips = zip(tip.pressures, design.tip_errors) if tip else ()
     yield from _listed("points of the tip", (f"at {kPa(float(P))}: {away:.3f} mm away" for P, away in tips))
     yield from _listed("active bounds", design.active_bounds or ["none"])
     if flush := design.content.result.get("flush_underside_costs_mm"):

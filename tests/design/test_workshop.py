@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import pneunet as pn
+from pneunet.base.materials.laws import PAPER_TWISTING
 from pneunet.cli import main
 from pneunet.design.workshop.limits import limits, wall_stretch
 from pneunet.design.workshop.sensitivity import sensitive
@@ -89,7 +90,7 @@ def test_what_matters_most_comes_first():
 
 
 def test_the_sheet_says_which_silicone_was_assumed():
-    body = Manipulator((Segment("one-sided", 90.0, 7),))
+    body = Manipulator((replace(FINGER, material=PAPER_TWISTING),))
     pack = Pack(DesignFile(body, 0.02), Moulds(), (), (), (), ())
     assert dict(sections(pack))["Mix"][0].startswith("ASSUMED silicone, where nobody gave another: paper, ")
     known = Manipulator((replace(body.segments[0], material=SILICONE),))
