@@ -322,7 +322,7 @@ def _bad_archive(random: Random, name: str) -> BadInput:
 def _bad_folder(random: Random) -> BadInput:
     """A folder of a design whose design.toml is bad, or none."""
     if random.random() < 0.2:
-        place = pick(random, ("nowhere", "design.toml", "folder/none", "x" * 300, "/dev/null"))
+        place = pick(random, ("nowhere", "target.toml", "folder/none", "x" * 300, "/dev/null"))
         return BadInput("report", ("report", place), {}, f"folder {place[:20]}")
     content, what = _changed_toml(random, "design.toml")
     return BadInput("report", ("report", "folder"), {"folder/design.toml": content}, what)
