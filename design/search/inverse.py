@@ -6,9 +6,9 @@ whole ones, then with dimensions on the grid that they are cast on.
 """
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -20,12 +20,14 @@ from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.groups import divided
 from pneunet.design.search.guesses import guesses, start
 from pneunet.design.search.problem import Evaluation, Problem
+from pneunet.design.search.walls import at_limits
 from pneunet.design.search.whole import STEPS, TRIED, on_grid, optimised, with_whole_chambers
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import Target
-from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
-from pneunet.reduced.analytic.clearance import gap_left
+from pneunet.geometry.parameters import PASSIVE, Manipulator
+from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.overlap import overlap_doubts
 
 Map = Callable[..., Iterable]
 #: of the curve's length: nothing better is looked for below the first; starts are tried until one is below
@@ -75,6 +77,22 @@ class Candidate:
         """Of the points that the first shape is to meet, mm: no frames and no other shapes in it."""
         away = self.at.shapes[0].placed.points - self.problem.aims[0].points
         return float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
+
+    @cached_property
+    def overlaps(self) -> bool:
+        """Whether the body runs through itself where its sections along the wanted curve would not."""
+        for aim, shape in zip(self.problem.aims, self.at.shapes):
+            if aim.nearest or len(aim.points) < 2 or not self._overlaps(aim, shape.placed.poses):
+                continue
+            wanted = shape.placed.poses.copy()
+            wanted[:, :3, 3] = aim.points
+            if not self._overlaps(aim, wanted):
+                return True
+        return False
+
+    def _overlaps(self, aim, poses):
+        line = Centreline(aim.fractions * self.manipulator.length, poses)
+        return bool(overlap_doubts(self.manipulator, line))
 
     def differs(self, other: "Candidate") -> bool:
         """Whether another one has other silicone, groups or numbers of chambers, or clearly other angles."""
@@ -130,7 +148,7 @@ def search(
     if not tried:
         assert failed is not None
         raise failed
-    chosen = min(tried, key=lambda one: one.best.rms)
+    chosen = min(tried, key=lambda one: (one.best.overlaps, one.best.rms))
     others = [one for one in tried if one is not chosen]
     chosen.evaluations += sum(one.evaluations for one in others)
     return chosen.found([one.best for one in others])
@@ -178,14 +196,19 @@ class _Search:
         bounds = sorted(_active(*whole), key=lambda pair: -pair[0])
         stopped = bounds[0][1] if bounds and bounds[0][0] > 0 else ""
         alternatives = self._alternatives(best, whole, self.guesses, rivals)
-        if alternatives and alternatives[0].rms < BETTER * best.rms:
-            best, alternatives = alternatives[0], (best, *alternatives[1:])
-            log.info(f"another candidate wins:  {best}")
-        touching = () if self.target.casting.allow_touch else _touching(best)
+        all_of_them = (best, *alternatives)
+        # none that runs through itself unless all do; then what is clearly better
+        best = min(all_of_them, key=lambda c: (c.overlaps, c.rms * (BETTER if c is self.best else 1.0)))
+        if best is not self.best:
+            alternatives = tuple(c for c in all_of_them if c is not best)
+            through = "; the design so far runs through itself" if self.best.overlaps > best.overlaps else ""
+            log.info(f"another candidate wins:  {best}{through}")
+        segments, pressures = best.manipulator.segments, best.at.body.pressures.max(axis=0)
+        of_walls = at_limits(segments, pressures, self.target.casting.allow_touch)
         return Found(
             best,
             alternatives,
-            (*(text for _, text in bounds), *touching),
+            (*(text for _, text in bounds), *of_walls),
             stopped,
             flush,
             self.evaluations,
@@ -349,20 +372,3 @@ def _active(problem, optimum):
         saved = np.sqrt(at.misfit) - np.sqrt(max(at.misfit - max(outwards, 0.0) * step, 0.0))
         worth = f"; {told} beyond would save {saved:.2g} mm" if saved >= WORTH_TELLING else ""
         yield float(saved) * (saved >= WORTH_TELLING), variable.text(value) + worth
-
-
-def _touching(candidate):
-    return about_to_touch(candidate.manipulator.segments, candidate.at.body.pressures.max(axis=0))
-
-
-def about_to_touch(segments: Sequence[Segment], pressures: Sequence[float]) -> Iterator[str]:
-    """Segments whose estimated clearance the design has used up, in words."""
-    for i, (segment, pressure) in enumerate(zip(segments, pressures), start=1):
-        if segment.kind == PASSIVE:
-            continue
-        left = gap_left(segment, float(pressure))
-        if left < 0.02 * segment.gap:
-            yield (
-                f"segment {i} clearance of facing walls (estimate: {max(left, 0.0):.2f} mm left of"
-                f" {segment.gap:.2f} mm)"
-            )

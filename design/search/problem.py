@@ -15,7 +15,7 @@ from pneunet.design.search.aims import Aim
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
 from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
-from pneunet.reduced.analytic.clearance import gap_left_and_slopes
+from pneunet.reduced.analytic.clearance import gap_left_and_slopes, wall_strain_and_slopes
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.loaded_slopes import loaded
 from pneunet.reduced.rod.piece_slopes import (
@@ -32,6 +32,9 @@ from pneunet.reduced.rod.states import StatesWithSlopes
 
 #: mm of misfit per mm that facing walls would overlap: contact is not designed into
 TOUCH = 5.0
+#: part of the strain that walls are allowed from which on it counts, and mm of misfit per allowed strain
+#: beyond: steep, so that the limit itself is kept
+NEARLY, TEAR = 0.95, 100.0
 BEYOND = 20.0  # mm of misfit per width of what the law knows that a segment lies outside of it
 #: mm of misfit per large change that a dimension leaves its start by: decides where the target does not
 PREFERENCE = 0.02
@@ -159,7 +162,7 @@ class Problem:
         misfit = sum(float(r @ r) for r, _ in parts) / len(parts)
         parts = [(r / np.sqrt(len(shapes)), J / np.sqrt(len(shapes))) for r, J in parts]
         parts += [self._doubts(i, shape) for i, shape in enumerate(shapes)]
-        parts += [self._unseen_twists(body, shapes[0]), self._touching(body), self._preferences(x)]
+        parts += [self._unseen_twists(body, shapes[0]), self._walls(body), self._preferences(x)]
         residual, jacobian = np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
         return Evaluation(body, shapes, residual, jacobian, misfit)
 
@@ -206,7 +209,7 @@ class Problem:
         return aim.misfit(placed), aim.slopes(placed, turns, moves)
 
     def _doubts(self, number, shape):
-        """BEYOND times how far each segment lies outside what the law knows."""
+        """BEYOND times how far each segment lies outside what the law knows, its limit point included."""
         states = shape.states
         segment, what = np.nonzero(states.excess)
         by = np.zeros((len(segment), len(states.excess), len(FIELDS)))
@@ -229,20 +232,28 @@ class Problem:
                 slopes.append(self.columns(by, 0))
         return np.array(rows), np.array(slopes).reshape(len(rows), len(self.x))
 
-    def _touching(self, body):
-        """TOUCH times by how much facing walls of each segment are expected to pass through each other."""
+    def _walls(self, body):
+        """TOUCH times by how much facing walls of each segment are expected to pass through each other, and
+        TEAR times by how much they are expected to stretch too far."""
         rows, slopes = [], []
-        for number, pressures in enumerate(() if self.may_touch else body.pressures):
+        for number, pressures in enumerate(body.pressures):
             for i, (segment, pressure) in enumerate(zip(body.segments, pressures)):
-                if segment.kind == PASSIVE:
-                    continue
-                left, by_left = gap_left_and_slopes(segment, pressure)
-                if left < 0:
-                    by = np.zeros((len(body.segments), len(FIELDS)))
-                    by[i, OF_LAWS] = by_left
-                    rows.append(-TOUCH * left)
-                    slopes.append(-TOUCH * self.columns(by, number))
+                for value, by_value in () if segment.kind == PASSIVE else self._beyond(segment, pressure):
+                    if value > 0:
+                        by = np.zeros((len(body.segments), len(FIELDS)))
+                        by[i, OF_LAWS] = by_value
+                        rows.append(value)
+                        slopes.append(self.columns(by, number))
         return np.array(rows), np.array(slopes).reshape(len(rows), len(self.x))
+
+    def _beyond(self, segment, pressure):
+        """Yields (mm of misfit where positive, its derivatives) of each limit of a segment's walls."""
+        if not self.may_touch:
+            left, by_left = gap_left_and_slopes(segment, pressure)
+            yield -TOUCH * left, -TOUCH * by_left
+        if np.isfinite(segment.material.elongation_at_break):
+            strain, by_strain = wall_strain_and_slopes(segment, pressure)
+            yield TEAR * (strain - NEARLY), TEAR * by_strain
 
     def _preferences(self, x):
         drawn = [(j, v.start, PREFERENCE / v.scale) for j, v in enumerate(self.variables) if v.start]

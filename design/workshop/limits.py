@@ -11,14 +11,12 @@ from pneunet.base.units import MPA_PER_KPA
 from pneunet.design.report.rundata import Solution
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Segment
-from pneunet.reduced.analytic.clearance import gap_left, wall_bulge
+from pneunet.reduced.analytic.clearance import allowed_stretch, gap_left, wall_stretch
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.prediction import doubts, predict
 
 #: of the design's pressure: no limit is looked for beyond
 FARTHEST = 3.0
-#: of the strain at break: what walls may come to, since bubbles and bonds tear before
-SAFE = 0.5
 
 
 @dataclass(frozen=True)
@@ -36,13 +34,6 @@ def limits(design: DesignFile, law: SegmentLaw, solved: Solution | None = None) 
     return sorted(found, key=lambda limit: limit.pressure)
 
 
-def wall_stretch(segment: Segment, pressure: float) -> float:
-    """Estimated mean stretch of a chamber's wall at `pressure` (MPa): an arc over the wall's shorter side."""
-    half = min(segment.chamber_height, segment.cavity_width / segment.sin) / 2
-    angle = 2 * np.arctan(wall_bulge(segment, pressure) / half)
-    return float(angle / np.sin(angle)) if angle > 1e-9 else 1.0
-
-
 def _touch(design, solved):
     told = None if solved is None else solved.record.get("first_touch_kPa")
     if told is not None:
@@ -54,21 +45,17 @@ def _touch(design, solved):
 
 
 def _break(design, solved):
-    allowed = {
-        m: 1 + SAFE * m.elongation_at_break
-        for m in design.manipulator.materials
-        if np.isfinite(m.elongation_at_break)
-    }
-    if solved is not None and allowed:
-        steps, most = solved.steps, min(allowed.values())
+    most = min(allowed_stretch(s) for s in design.manipulator.segments)
+    if solved is not None and np.isfinite(most):
+        steps = solved.steps
         over = np.flatnonzero(steps["largest_stretch"] > most)
         if len(over):
             pressure = steps["pressure_kPa"][over[0]] * MPA_PER_KPA
             yield Limit(pressure, f"stretch {most:.2f}, half of the elongation at break (finite elements)")
             return
-    pressure, i = _first(design, lambda s, p: allowed.get(s.material, np.inf) - wall_stretch(s, p), solved)
+    pressure, i = _first(design, lambda s, p: allowed_stretch(s) - wall_stretch(s, p), solved)
     if i is not None:
-        most = allowed[design.manipulator.segments[i - 1].material]
+        most = allowed_stretch(design.manipulator.segments[i - 1])
         yield Limit(
             pressure,
             f"walls of segment {i} come to stretch {most:.2f}, half of the elongation at break (estimate by"

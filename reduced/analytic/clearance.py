@@ -1,4 +1,4 @@
-"""Will neighbouring chambers touch? A plate estimate of how far their walls bulge into the gap.
+"""Will neighbouring chambers touch, will their walls tear? A plate estimate of how far walls bulge.
 
 A chamber's wall is taken as a rectangular plate, clamped on all edges, of the cavity's height and slanted
 length and of thickness `wall`, under the pressure P. Central deflection w from Roark's Formulas for Stress
@@ -6,6 +6,8 @@ and Strain (7th ed., Table 11.12, edges held), fitted by P a^4/(E t^4) = w/(alph
 the shorter side, E = 3 mu and alpha(b/a) Timoshenko's small-deflection coefficient. Against the FE of
 twist-w12 and one-sided-w10 at 50 kPa it closes the gap 1.2 to 1.4 times too far: real edges turn, but gaps
 also open as the segment bends. It is a design rule; only the FE says whether walls touch.
+
+A bulging wall is an arc over its shorter side: its mean stretch is the arc's length over the side's.
 """
 
 import numpy as np
@@ -17,6 +19,10 @@ from pneunet.geometry.shape_numbers import SHAPE
 SIDE_RATIOS = np.array([1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 1e9])
 ALPHA = np.array([0.00126, 0.00172, 0.00207, 0.00230, 0.00245, 0.00254, 0.00260]) * 12 * 0.91
 MEMBRANE = 30.0
+#: of the strain at break: what walls may come to, since bubbles and bonds tear before
+SAFE = 0.5
+#: bulge over half of the shorter side, below which an arc's stretch is taken as a parabola's
+FLAT = 1e-4
 
 
 def wall_bulge(segment: Segment, pressure: float) -> float:
@@ -26,7 +32,7 @@ def wall_bulge(segment: Segment, pressure: float) -> float:
 
 def _bulge(segment, pressure):
     """(deflection, its derivatives by the cavity's height, its slanted length, the wall and the pressure)."""
-    height, length = segment.chamber_height, segment.cavity_width / segment.sin
+    height, length = _sides(segment)
     short, long = min(height, length), max(height, length)
     t, mu = segment.wall, segment.material.mu
     load = pressure * short**4 / (3 * mu * t**4)
@@ -54,10 +60,54 @@ def gap_left(segment: Segment, pressure: float) -> float:
 def gap_left_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
     """(the same, its derivatives (15,) by geometry.shape_numbers.SHAPE, in degrees and mm, and by the
     pressure and the modulus in MPa)."""
-    bulge, by_height, by_length, by_wall, by_pressure = _bulge(segment, pressure)
+    bulge, *by = _bulge(segment, pressure)
+    slopes = _by_variables(segment, pressure, *by)
+    slopes[SHAPE.index("gap")] -= 0.5
+    return segment.gap - 2 * bulge, -2 * slopes
+
+
+def wall_stretch(segment: Segment, pressure: float) -> float:
+    """Estimated mean stretch of a chamber's wall at `pressure` (MPa): an arc over the wall's shorter side."""
+    return _arc(2 * wall_bulge(segment, pressure) / min(_sides(segment)))[0]
+
+
+def allowed_stretch(segment: Segment) -> float:
+    """Of a wall: SAFE of the silicone's elongation at break; inf where that is not known."""
+    return 1 + SAFE * segment.material.elongation_at_break
+
+
+def wall_strain_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
+    """(part of the allowed strain that a wall is estimated to come to, its derivatives (15,) as in
+    `gap_left_and_slopes`); zeros where the elongation at break is not known."""
+    allowed = allowed_stretch(segment) - 1
+    bulge, by_height, by_length, *by_others = _bulge(segment, pressure)
+    height, length = _sides(segment)
+    short = min(height, length)
+    ratio = 2 * bulge / short
+    stretch, by_ratio = _arc(ratio)
+    by_height -= ratio / 2 * (height <= length)  # 2 bulge/short changes with the short side, too
+    by_length -= ratio / 2 * (height > length)
+    slopes = _by_variables(segment, pressure, by_height, by_length, *by_others)
+    return (stretch - 1) / allowed, by_ratio * 2 / short / allowed * slopes
+
+
+def _arc(ratio):
+    """(length of an arc over its chord's, derivative) by its height over half of the chord."""
+    if ratio < FLAT:
+        return 1 + 2 * ratio**2 / 3, 4 * ratio / 3
+    half_angle = float(np.arctan(ratio))
+    return half_angle * (1 + ratio**2) / ratio, 1 / ratio + half_angle * (1 - 1 / ratio**2)
+
+
+def _sides(segment):
+    """A wall's height and slanted length, mm."""
+    return segment.chamber_height, segment.cavity_width / segment.sin
+
+
+def _by_variables(segment, pressure, by_height, by_length, by_wall, by_pressure):
+    """(15,) derivatives by SHAPE, pressure and modulus of what has these by what `_bulge` depends on."""
     by_mu = -pressure / segment.material.mu * by_pressure  # the load is their ratio
     by_angle = -by_length * segment.cavity_width * segment.cot / segment.sin * np.radians(1.0)
-    by = {"chamber_height": by_height, "wall": by_wall, "angle": by_angle, "gap": -0.5}
+    by = {"chamber_height": by_height, "wall": by_wall, "angle": by_angle}
     by |= {"width": by_length / segment.sin, "side_wall": -2 * by_length / segment.sin}
-    slopes = np.array([by.get(name, 0.0) for name in SHAPE] + [by_pressure, by_mu])
-    return segment.gap - 2 * bulge, -2 * slopes
+    return np.array([by.get(name, 0.0) for name in SHAPE] + [by_pressure, by_mu])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneunet.base import se3
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import to_table
 from pneunet.base.materials.laws import PAPER_TWISTING, of_modulus, silicone
@@ -20,7 +21,7 @@ from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import read_design_file
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced import predict
-from pneunet.reduced.analytic.clearance import gap_left
+from pneunet.reduced.analytic.clearance import gap_left, wall_stretch
 from tests.design.test_inverse import BASE, made
 from tests.design.toy_law import ToyLaw
 
@@ -55,6 +56,48 @@ def test_walls_and_touching_are_the_casters_to_allow():
     allowed = replace(target, casting=Casting(walls=(0.6, 0.7), allow_touch=True))
     touching = search(allowed, extract(allowed, pieces), ToyLaw(), alternatives=0).best.manipulator.segments
     assert any(gap_left(s, 0.05) < -0.05 for s in touching)
+
+
+def test_walls_of_a_brittle_silicone_stay_below_half_of_its_elongation_at_break():
+    line, pieces = made(PAIR, 0.05)
+    brittle = replace(PAPER_TWISTING, elongation_at_break=0.03)
+    target = Target(line.points, pieces=pieces, casting=Casting(allow_touch=True, walls=(1.0, 1.0)), **BASE)
+    tough = search(target, extract(target, pieces), ToyLaw(), alternatives=0)
+    of_tough = [wall_stretch(s, tough.best.pressure) for s in tough.best.manipulator.segments]
+    assert max(of_tough) > 1.015 and not any("stretch of walls" in text for text in tough.active)
+    target = replace(target, material=brittle)
+    kept = search(target, extract(target, pieces), ToyLaw(), alternatives=0)
+    of_kept = [wall_stretch(s, kept.best.pressure) for s in kept.best.manipulator.segments]
+    assert max(of_kept) < 1.015
+    most = int(np.argmax(of_kept))
+    told = f"segment {most + 1} stretch of walls (estimate: {of_kept[most]:.3f} of 1.015 allowed)"
+    assert told in kept.active
+
+
+def test_a_body_that_runs_through_itself_wins_only_where_the_curve_does(monkeypatch):
+    line, pieces = made(PAIR)
+    target = Target(line.points, pieces=pieces, **BASE)
+    turn = np.linspace(0, 4 * np.pi, 101)  # twice around a circle of 20 mm
+    twice = np.column_stack([20 * np.sin(turn), 20 - 20 * np.cos(turn), 0 * turn])
+
+    def coiled(best, wanted):
+        """A better one that is a coil, where `wanted` is the curve."""
+        (shape, *_), (aim, *_) = best.at.shapes, best.problem.aims
+        poses = np.tile(np.eye(4), (len(turn), 1, 1))
+        poses[:, :3, :3] = se3.exp_rotation(turn[:, None] * [0.0, 0.0, 1.0])
+        poses[:, :3, 3] = twice
+        at = replace(best.at, shapes=(replace(shape, placed=replace(shape.placed, poses=poses)),))
+        problem = replace(best.problem, aims=(replace(aim, points=aim.points if wanted is None else wanted),))
+        return replace(best, rms=best.rms / 2, at=at, problem=problem)
+
+    for wanted in (None, twice):
+        found = lambda self, best, *others, wanted=wanted: (coiled(best, wanted),)  # noqa: E731
+        monkeypatch.setattr(_Search, "_alternatives", found)
+        found = search(target, extract(target, pieces), ToyLaw())
+        (other,) = found.alternatives
+        better, worse = sorted((found.best, other), key=lambda c: c.rms)
+        assert better.overlaps == (wanted is None) and not worse.overlaps
+        assert found.best is (worse if wanted is None else better)
 
 
 def test_one_body_meets_two_shapes_at_their_pressures():
@@ -186,7 +229,8 @@ def test_the_silicone_is_chosen_from_a_list_or_a_range():
 def test_a_limit_below_the_pressure_is_said():
     weak = replace(PAPER_TWISTING, elongation_at_break=0.001)
     line, pieces = made(PAIR, 0.05)
-    target = Target(line.points, pieces=pieces, material=weak, pressure_range=(0.05, 0.05), **BASE)
+    fixed = {"pressure_range": (0.05, 0.05), "vary": {}}  # no dimension can make up for it
+    target = Target(line.points, pieces=pieces, material=weak, **fixed, **BASE)
     told = inverse_design(target, law=ToyLaw(limit=0.06)).content.result["pressure_limits"]
     assert "(EXCEEDED): walls of segment " in told[0] and "elongation at break" in told[0]
     gives_way = next(text for text in told if text.endswith("the law finds no equilibrium beyond"))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from pneunet.base import se3
+from pneunet.base.materials.laws import PAPER_TWISTING
 from pneunet.design.search.aims import EQ27, Aim
-from pneunet.design.search.problem import Body, Problem
+from pneunet.design.search.problem import BEYOND, Body, Problem
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.target import Target
@@ -16,10 +17,12 @@ from pneunet.reduced import predict, shipped_law
 from pneunet.reduced.rod.ends import cell_strains, free_pieces
 from pneunet.reduced.rod.piece_slopes import FIELDS, cell_states, piece_twists
 
+#: of a silicone so brittle that the walls of its segment, and of no other, would tear at either pressure
+BRITTLE = replace(PAPER_TWISTING, elongation_at_break=0.03)
 SEGMENTS = (
     Segment("twisting", 65.0, 1, gap=2.2, cavity_floor=0.4, chamber_height=5.5),
     Segment("one-sided", 84.0, 1, wall=0.8, gap=0.9, cavity_floor=0.5),  # its walls would overlap
-    Segment("one-sided", 118.0, 1, chamber_height=4.4, cavity_floor=0.5, roll=180),
+    Segment("one-sided", 118.0, 1, chamber_height=4.4, cavity_floor=0.5, roll=180, material=BRITTLE),
     Segment("one-sided", 118.0, 1).plain(14.0),
 )
 #: so that no station lies where a joint passes within the differences, where derivatives jump
@@ -66,10 +69,20 @@ def test_every_derivative_is_exact():
     x = these.x + np.concatenate([0 * these.x[:-3], [0.1, -0.2, 0.15]])  # a base that is turned
     scale = these.bounds[2]
     at, by_differences = these.evaluate(x), differences(these.evaluate, x, scale)
-    preferences, overlaps, twists = len(these.variables) - 3, 1, 1
-    assert at.residual.shape == (101 * 12 + preferences + overlaps + twists,)
+    preferences, overlaps, tears, twists = len(these.variables) - 3, 1, 2, 1
+    assert at.residual.shape == (101 * 12 + preferences + overlaps + tears + twists,)
     error = np.linalg.norm((at.jacobian - by_differences) * scale, axis=0)
     assert (error <= 1e-6 * np.linalg.norm(at.jacobian * scale, axis=0).max()).all()
+
+
+def test_a_pressure_beyond_the_limit_point_is_misfit():
+    law, these = shipped_law(), problem(shipped_law())
+    high = replace(SEGMENTS[0], chamber_height=8.0, gap=3.0)  # its path ends between 60 and 100 kPa
+    assert law.excess(high, 0.06)[-1] <= 0 < law.excess(high, 0.1)[-1]
+    body = replace(these.body, segments=(high, *SEGMENTS[1:]), pressures=np.full((2, 4), 0.1))
+    there = replace(these, body=body)
+    expected = BEYOND * law.excess(high, 0.1)[-1]
+    assert np.isclose(there.evaluate(there.x).residual, expected, rtol=1e-6).sum() == 2  # of each shape
 
 
 def test_the_gradient_to_nearest_points_is_exact():

@@ -9,14 +9,14 @@ import pytest
 import pneunet as pn
 from pneunet.base.materials.laws import PAPER_TWISTING
 from pneunet.cli import main
-from pneunet.design.workshop.limits import limits, wall_stretch
+from pneunet.design.workshop.limits import limits
 from pneunet.design.workshop.sensitivity import sensitive
 from pneunet.design.workshop.sheet import Pack, sections
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.designfile import DesignFile, write_design_file
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.analytic.clearance import gap_left
+from pneunet.reduced.analytic.clearance import gap_left, wall_bulge, wall_stretch
 from tests.design.toy_law import ToyLaw
 
 SILICONE = pn.silicone("Ecoflex 00-30")
@@ -74,8 +74,6 @@ def test_limits_are_where_the_estimates_say():
 def test_a_bulging_wall_stretches_as_an_arc():
     """A wall that bulges by half its height is half a circle: pi / 2."""
     from scipy.optimize import brentq
-
-    from pneunet.reduced.analytic.clearance import wall_bulge
 
     half = min(FINGER.chamber_height, FINGER.cavity_width) / 2
     pressure = brentq(lambda p: wall_bulge(FINGER, p) - half, 1e-6, 100)
