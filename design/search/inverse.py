@@ -105,8 +105,9 @@ class Candidate:
 @dataclass(frozen=True, eq=False)
 class Found:
     """best: the design. alternatives: distinct ones, best first. active: bounds that the optimum sits on, and
-    what they cost; stopped_by: the one that costs most, "" where none costs anything. flush_costs: mm by
-    which steps in the underside would lower the misfit. pieces: with the groups that were chosen."""
+    what they cost; stopped_by: the one that costs most, a limit of walls where none costs anything, "" where
+    there is none. flush_costs: mm by which steps in the underside would lower the misfit. pieces: with the
+    groups that were chosen."""
 
     best: Candidate
     alternatives: tuple[Candidate, ...]
@@ -194,7 +195,6 @@ class _Search:
         best, whole = self.best, self.whole
         flush = self._flush_costs(*self.real)
         bounds = sorted(_active(*whole), key=lambda pair: -pair[0])
-        stopped = bounds[0][1] if bounds and bounds[0][0] > 0 else ""
         alternatives = self._alternatives(best, whole, self.guesses, rivals)
         all_of_them = (best, *alternatives)
         # none that runs through itself unless all do; then what is clearly better
@@ -204,12 +204,13 @@ class _Search:
             through = "; the design so far runs through itself" if self.best.overlaps > best.overlaps else ""
             log.info(f"another candidate wins:  {best}{through}")
         segments, pressures = best.manipulator.segments, best.at.body.pressures.max(axis=0)
-        of_walls = at_limits(segments, pressures, self.target.casting.allow_touch)
+        of_walls = list(at_limits(segments, pressures, self.target.casting.allow_touch))
+        stopping = [text for saved, text in bounds if saved > 0] + of_walls
         return Found(
             best,
             alternatives,
             (*(text for _, text in bounds), *of_walls),
-            stopped,
+            stopping[0] if stopping else "",
             flush,
             self.evaluations,
             self.pieces,

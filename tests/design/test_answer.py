@@ -72,6 +72,8 @@ def test_walls_of_a_brittle_silicone_stay_below_half_of_its_elongation_at_break(
     most = int(np.argmax(of_kept))
     told = f"segment {most + 1} stretch of walls (estimate: {of_kept[most]:.3f} of 1.015 allowed)"
     assert told in kept.active
+    fixed = replace(target, vary={}, start={"end_margin": 3.0})  # the pressure alone gives in
+    assert "stretch of walls" in search(fixed, extract(fixed, pieces), ToyLaw(), alternatives=0).stopped_by
 
 
 def test_a_body_that_runs_through_itself_wins_only_where_the_curve_does(monkeypatch):
