@@ -41,8 +41,12 @@ def complain(text: object) -> None:
 
 
 def under_launcher() -> bool:
-    """Whether an MPI launcher has started this process."""
-    return any(name in os.environ for name in RANK_VARIABLES)
+    """Whether an MPI launcher has started this process.
+
+    The children of a process that uses MPI without one inherit its marks, and Open MPI's that it is alone.
+    """
+    alone = os.environ.get("OMPI_MCA_ess") == "singleton"
+    return not alone and any(name in os.environ for name in RANK_VARIABLES)
 
 
 class _Screen(logging.Handler):

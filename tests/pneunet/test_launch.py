@@ -9,6 +9,7 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.base.system import launch
+from pneunet.base.system.processes import environment_without_launcher
 from pneunet.cli import COMMANDS
 
 RUN = [sys.executable, "-m", "pneunet", "run", "-n"]
@@ -27,6 +28,17 @@ def test_ranks_find_each_other_also_more_than_cores(ranks):
     done = run(ranks, "--", "python", "-c", SIZE)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == [str(ranks), str(ranks * (ranks - 1) // 2)]
+
+
+def test_children_of_a_process_that_uses_mpi_alone_are_under_no_launcher():
+    child = "from pneunet.base.system.log import under_launcher as u; print(u(), flush=True)"
+    code = (
+        f"from mpi4py import MPI; import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
+    )
+    environment = environment_without_launcher()
+    alone = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    assert alone.stdout.split() == ["False"], alone.stderr
+    assert run(2, "--", "python", "-c", child).stdout.split() == ["True", "True"]
 
 
 def test_arguments_with_spaces_and_input_reach_the_program():
