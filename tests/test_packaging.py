@@ -52,8 +52,8 @@ def tracked():
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory):
     """(wheel of a copy of the checkout, wheel of the sdist of that copy)."""
-    if not (ROOT / ".git").exists():
-        pytest.skip("no checkout: what belongs to the sources is not known")
+    if not (ROOT / ".git").exists():  # an unpacked sdist, or the copy in the image
+        pytest.skip("no checkout: only git knows which files belong into a wheel")
     copy = tmp_path_factory.mktemp("copy")
     for name in tracked():
         (copy / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,5 +1,7 @@
 """What points of a target must be: checks of points, frames and weights, whoever gives them."""
 
+from typing import Any
+
 import numpy as np
 
 from pneunet.base.errors import InputError
@@ -13,6 +15,19 @@ MOST_POINTS = 200_000
 STRIDE = 10.0
 #: cosine of the turn from one such chord to the next that no body makes
 FOLD = np.cos(np.radians(150.0))
+
+
+def check_curve(curve: Any) -> None:
+    """Put checked arrays in the place of a frozen instance's own points (n, 3) in mm, frames (n, 3, 3) and
+    weights (n,); of the last two None stays. InputError as below."""
+    points = checked_points(curve.points)
+    checked = {"points": points}
+    if curve.frames is not None:
+        checked["frames"] = checked_frames(curve.frames, points)
+    if curve.weights is not None:
+        checked["weights"] = checked_weights(curve.weights, len(points))
+    for name, values in checked.items():
+        object.__setattr__(curve, name, values)
 
 
 def checked_points(points: object) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError, located
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.design.target.points import checked_frames, checked_points, checked_weights
+from pneunet.design.target.points import check_curve, checked_weights
 
 PRESSURE_LIMIT = 0.060  # MPa; beyond it silicone pneu-nets leak (Jiang et al. 2021, Sec. IV D)
 
@@ -28,12 +28,7 @@ class TargetShape:
     weights: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        points = checked_points(self.points)
-        object.__setattr__(self, "points", points)
-        if self.frames is not None:
-            object.__setattr__(self, "frames", checked_frames(self.frames, points))
-        if self.weights is not None:
-            object.__setattr__(self, "weights", checked_weights(self.weights, len(points)))
+        check_curve(self)
         object.__setattr__(self, "pressures", checked_pressures(self.pressures))
 
     @cached_property

@@ -11,7 +11,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, of_modulus, silicone
 from pneunet.base.quantities import Checked, quantity
 from pneunet.design.target.casting import Casting
-from pneunet.design.target.points import checked_frames, checked_points, checked_weights
+from pneunet.design.target.points import check_curve
 from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
 from pneunet.design.target.shapes import TargetShape, TipPoints, checked_pressures
 from pneunet.geometry.loading import DeadLoads
@@ -97,14 +97,10 @@ class Target:
         return read_target(path)
 
     def __post_init__(self) -> None:
-        points = checked_points(self.points)
-        object.__setattr__(self, "points", points)
-        if self.frames is not None:
-            object.__setattr__(self, "frames", checked_frames(self.frames, points))
-        if self.weights is not None:
-            object.__setattr__(self, "weights", checked_weights(self.weights, len(points)))
-            if not self.weights.any() and self.tip is None and not self.shapes:
-                raise InputError("weights: all are 0, so that nothing is asked for: give one that is larger")
+        check_curve(self)
+        nothing_else = self.tip is None and not self.shapes
+        if self.weights is not None and not self.weights.any() and nothing_else:
+            raise InputError("weights: all are 0, so that nothing is asked for: give one that is larger")
         object.__setattr__(self, "gravity", DeadLoads(gravity=tuple(self.gravity)).gravity)
         if self.pressures:
             object.__setattr__(self, "pressures", checked_pressures(self.pressures))

@@ -14,7 +14,6 @@ from pneunet.reduced import AnalyticLaw
 from tests.browser import CHROMIUM, Browser
 from tests.design.fake_run import PLANE, POSE, make_run
 
-pytest.importorskip("pyvista")
 #: a picture of the plot, made by its own page
 SHOT = (
     "Plotly.toImage(document.querySelector('.js-plotly-plot'), {width: 400, height: 500})"
@@ -59,7 +58,6 @@ def test_a_closed_cavity_is_left_out():
 
 
 def test_a_design_alone_is_shown_by_the_reduced_model(tmp_path):
-    pytest.importorskip("plotly")
     make_run(tmp_path / "run", segments=(PLANE,), solve=False)
     steps = load_steps(read_design_folder(tmp_path / "run"), AnalyticLaw())
     assert not steps.solved and steps.labels[0] == "0 kPa" and steps.labels[-1] == "20 kPa"
@@ -81,7 +79,6 @@ def test_a_page_that_would_be_too_large_shows_fewer_steps(tmp_path, monkeypatch)
 
 
 def test_the_page_is_in_the_report_and_bad_input_is_one_line(tmp_path, capsys):
-    pytest.importorskip("plotly")
     make_run(tmp_path / "run", segments=(PLANE,), solve=False)
     assert main(["view", str(tmp_path / "run"), "--film", "gif"]) == 0
     page = tmp_path / "run" / "view.html"
@@ -94,7 +91,6 @@ def test_the_page_is_in_the_report_and_bad_input_is_one_line(tmp_path, capsys):
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium")
 def test_a_browser_shows_it_and_the_slider_moves_it(tmp_path):
-    pytest.importorskip("plotly")
     make_run(tmp_path / "run", segments=(PLANE,), solve=False)
     assert main(["view", str(tmp_path / "run")]) == 0
     with Browser() as browser:
