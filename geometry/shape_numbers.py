@@ -1,5 +1,5 @@
 """A cell's shape without a length: what strains times a length depend on when the material has only one
-modulus."""
+modulus; and the directions in which cells differ, those of their material included."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +18,9 @@ SHAPE = (
 _dimensions = attrgetter(*SHAPE)
 #: (13,) derivatives of the normal pitch by them
 PITCH_BY = np.array([{"cavity_thickness": 1.0, "wall": 2.0, "gap": 1.0}.get(name, 0.0) for name in SHAPE])
-#: kind -> name -> changes of SHAPE by one: the directions in which designs differ when the normal pitch is
+#: how a material stiffens, after SHAPE among a cell's numbers: of Yeoh's law
+STIFFENING = ("c20/c10", "c30/c10")
+#: kind -> name -> changes of SHAPE by one: the directions in which shapes differ when the normal pitch is
 #: the unit of length. Walls and cavities grow at the gap's cost; what a campaign ties together
 #: (hifi.runs.campaign.sample) moves together
 _OF_BOTH = {
@@ -47,8 +49,9 @@ DIRECTIONS = {
 
 
 def direction_matrix(kind: str) -> np.ndarray:
-    """(directions, 13) changes of the shape numbers along DIRECTIONS."""
-    return np.array([[change.get(name, 0.0) for name in SHAPE] for change in DIRECTIONS[kind].values()])
+    """(directions, 15) changes of SHAPE and STIFFENING: along DIRECTIONS, then one of STIFFENING each."""
+    changes = [*DIRECTIONS[kind].values(), *({name: 1.0} for name in STIFFENING)]
+    return np.array([[change.get(name, 0.0) for name in (*SHAPE, *STIFFENING)] for change in changes])
 
 
 def changed(segment: Segment, change: Mapping[str, float], step: float) -> Segment:

@@ -2,12 +2,13 @@
 
 Written by `pneunet campaign` (finite elements), read by `pneunet train`: the two meet here and nowhere else.
 All numbers are without dimension. With l the normal pitch (thickness of a chamber and a gap, across the
-chamber) and mu the shear modulus of the neo-Hookean material, and everything per undeformed length of the
+chamber) and mu = 2 c10 the shear modulus of Yeoh's material, and everything per undeformed length of the
 segment:
     pressure P/mu, strains q = (e, k l), forces dpsi/dq = (force/(mu l^2), moment/(mu l^3)), stiffness
     d2psi/dq2, volume V/l^2, energy W/(mu l^2)
-Derivatives by the shape are along about['directions'], by kind: changes of the shape numbers (degrees, normal
-pitches). One row a *case* (a design on a mesh) and one row a *state* (an equilibrium of a case).
+Derivatives by shape and material are along about['directions'], by kind: changes of the shape numbers
+(degrees, normal pitches) and of the stiffening. One row a *case* (a design on a mesh) and one row a *state*
+(an equilibrium of a case).
 """
 
 from dataclasses import Field, dataclass, field, fields
@@ -19,18 +20,18 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.archive import Member, read_archive, write_archive
 
-SCHEMA = "pneunet-cells-2"
+SCHEMA = "pneunet-cells-3"
 FIX = "make it again with pneunet campaign"
 #: keys of `about` that are read again, and their types
 KEYS = {
-    **dict.fromkeys(("kinds", "meshes", "shape", "statuses", "revisions"), list),
+    **dict.fromkeys(("kinds", "meshes", "shape", "stiffening", "statuses", "revisions"), list),
     **dict.fromkeys(("directions", "reasons", "campaign", "ranges"), dict),
     "largest_symmetry_defect": float,
 }
 #: row-wise upper triangle of a symmetric 6 x 6 matrix
 UPPER = np.triu_indices(6)
 #: directions that a kind may have at most; rows beyond its own are nan
-DIRECTIONS = 10
+DIRECTIONS = 12
 #: of the 23 bits of a slope's mantissa, those that are kept: to 1e-4 of itself, a hundredth of what a mesh
 #: changes (a seventh off the file)
 SLOPE_BITS = 12
@@ -65,6 +66,9 @@ class CellData:
     shape: np.ndarray = column(
         "cases", (13,), "f4", "about['shape']: angle in degrees, lengths in normal pitches"
     )
+    stiffening: np.ndarray = column(
+        "cases", (2,), "f4", "about['stiffening']: c20/c10 and c30/c10 of Yeoh's law"
+    )
     normal_pitch_mm: np.ndarray = column("cases", (), "f4", "as sampled; everything else is divided by it")
     status: np.ndarray = column("cases", (), "i1", "index into about['statuses']", index_of="statuses")
     limit_pressure: np.ndarray = column(
@@ -87,7 +91,9 @@ class CellData:
     volume: np.ndarray = column("states", (), "f4", "of the air per length")
     energy: np.ndarray = column("states", (), "f4", "stored, per length")
     unstable: np.ndarray = column("states", (), "i1", "unstable directions, free strains included")
-    largest_stretch: np.ndarray = column("states", (), "f4", "largest principal stretch in the solid")
+    largest_stretch: np.ndarray = column(
+        "states", (), "f4", "principal stretch, mean over the most stretched 1 % of the solid"
+    )
     residual: np.ndarray = column("states", (), "f4", "norm over mu pitch^2")
     wall_distance: np.ndarray = column(
         "states", (), "f4", "smallest of neighbouring chambers over l; nan: not measured", gaps=True
@@ -214,7 +220,7 @@ def _members(about, _):
 
 def _require_lists(about):
     """InputError for what stands in `about` under the right keys and is no such thing."""
-    words = [word for key in ("shape", "statuses", "revisions") for word in about[key]]
+    words = [word for key in ("shape", "stiffening", "statuses", "revisions") for word in about[key]]
     wrong = [kind for kind in about["kinds"] if kind not in FORBIDDEN]
     wrong += [mesh for mesh in about["meshes"] if not isinstance(mesh, dict) or "name" not in mesh]
     wrong += [word for word in words if not isinstance(word, str)]
@@ -226,6 +232,7 @@ def _require_lists(about):
 
 def _is_matrix(rows, about):
     try:
-        return np.array(rows, float).reshape(-1, len(about["shape"])).shape[0] <= DIRECTIONS
+        numbers = len(about["shape"]) + len(about["stiffening"])
+        return np.array(rows, float).reshape(-1, numbers).shape[0] <= DIRECTIONS
     except (TypeError, ValueError):
         return False

@@ -21,10 +21,11 @@ def grid_cell(
     layer: float | None = None,
     gaps: bool = False,
     part: bool = False,
+    like: Segment | None = None,
 ) -> dict[str, Any]:
     """Write the mesh of geometry.grids.cell.cell_grid to `path`, an .npz, and beside it gmsh's .msh; returns
     {"body_mm3", "air_mm3", "cells", "part"}, volumes of the whole pitch."""
-    mesh = cell_grid(segment, size, layer, gaps, part).mesh(air=True)
+    mesh = cell_grid(segment, size, layer, gaps, part, like).mesh(air=True)
     volumes, copies = mesh.volumes(), 1 + part * len(HALF_TURNS[segment.kind])
     air, medium = mesh.cell_tags == tags.AIR, mesh.cell_tags == tags.GAP
     facts = {

@@ -4,7 +4,8 @@ rest."""
 import numpy as np
 
 from pneunet.geometry import tags
-from pneunet.geometry.grids.planes import along, lean, sideways, snapped, upright
+from pneunet.geometry.grids.morph import Morph
+from pneunet.geometry.grids.planes import SAME, along, lean, sideways, snapped, upright
 from pneunet.geometry.grids.tensor import CAVITY_AIR, CHANNEL_AIR, EMPTY, TensorGrid
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 
@@ -13,24 +14,33 @@ HALF_TURNS = {ONE_SIDED: ((-1, -1, 1),), TWISTING: ((-1, -1, 1), (1, -1, -1), (-
 
 
 def cell_grid(
-    segment: Segment, size: float, layer: float | None = None, gaps: bool = False, part: bool = False
+    segment: Segment,
+    size: float,
+    layer: float | None = None,
+    gaps: bool = False,
+    part: bool = False,
+    like: Segment | None = None,
 ) -> TensorGrid:
     """The cell of `segment`, a chamber centred at xi = 0, with elements whose edges along x, y and z are at
     most `size` mm.
 
     layer (mm): one element of this thickness on each side of every plane in which stresses are singular.
     gaps: the room between the chambers is meshed too. part: only xi >= 0, and of a twisting cell only y >= 0:
-    HALF_TURNS make the rest.
+    HALF_TURNS make the rest. like: a segment whose elements the grid has, as many between any two planes,
+    whatever size they come to here: a response on such grids is smooth in the design.
     """
     s = snapped(segment)
-    twisting = s.kind == TWISTING
-    xi = along(s).divided(size, layer)
+    twisting, planes = s.kind == TWISTING, like or s
+    xi = along(planes).divided(size, layer)
+    y = sideways(planes, middle=twisting).divided(size, layer)
+    z = upright(planes, size).divided(size, layer)
+    if like:
+        to = Morph(like, s)
+        xi, y, z = (_apart(a) for a in (to.along(xi), to.sideways(y), to.upright(z)))
     if not part:
         xi = np.concatenate([-xi[:0:-1], xi])
-    y = sideways(s, middle=twisting).divided(size, layer)
     if part and twisting:
-        y = y[y > -1e-9]
-    z = upright(s, size).divided(size, layer)
+        y = y[y > -SAME]
     middles = [(a[1:] + a[:-1]) / 2 for a in (xi, y, z)]
     places = np.meshgrid(*middles, indexing="ij", sparse=True)
     kinds = contents(s, places[0], places[1], places[2], gaps=gaps)
@@ -38,6 +48,11 @@ def cell_grid(
     if part and twisting:
         ends[1, -1] = None
     return TensorGrid(sheared(s, xi, y, z), kinds, ends)
+
+
+def _apart(places):
+    """Those that differ: planes of another cell may be one here."""
+    return places[np.append(True, np.diff(places) > SAME)]
 
 
 def sheared(segment: Segment, xi: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ from pneunet.geometry.parameters import TWISTING, Segment
 SNAP = 0.1
 #: mm: a chamber rises above the core at least by this
 LOWEST_RISE = 0.05
-_SAME = 1e-9
+#: mm: planes nearer than this are one
+SAME = 1e-9
 
 
 def snapped(segment: Segment) -> Segment:
@@ -40,7 +41,7 @@ def snapped(segment: Segment) -> Segment:
         if 0 < abs(s.cavity_top - height) < SNAP and height > s.cavity_floor:
             s = replace(s, chamber_height=height - s.cavity_floor)
     rise = s.chamber_top - s.core_top
-    return replace(s, top_wall=s.top_wall + LOWEST_RISE - rise) if rise < LOWEST_RISE - _SAME else s
+    return replace(s, top_wall=s.top_wall + LOWEST_RISE - rise) if rise < LOWEST_RISE - SAME else s
 
 
 def _with_floor(s, floor):
@@ -64,7 +65,7 @@ class Planes:
         """Of places in any order; what is there twice is one plane."""
         places = np.array([*sharp, *smooth], float)
         order = np.argsort(places, kind="stable")
-        first = np.append(True, np.diff(places[order]) > _SAME)
+        first = np.append(True, np.diff(places[order]) > SAME)
         # those that are sharp and smooth are sharp
         groups, kinds = np.cumsum(first) - 1, np.arange(len(places))[order] < len(sharp)
         return cls(places[order][first], np.bincount(groups, kinds) > 0)
@@ -76,7 +77,7 @@ class Planes:
 
     def within(self, low: float, high: float) -> "Planes":
         """Those between two of them, which included."""
-        kept = (self.places > low - _SAME) & (self.places < high + _SAME)
+        kept = (self.places > low - SAME) & (self.places < high + SAME)
         return Planes(self.places[kept], self.sharp[kept])
 
     def divided(self, size: float, layer: float | None = None) -> np.ndarray:

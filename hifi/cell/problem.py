@@ -32,7 +32,7 @@ from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.contact.walls import CellWalls, WallContact
 from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.compat import compile_form
-from pneunet.hifi.fem.materials import energy_density
+from pneunet.hifi.fem.materials import constants_of, energy_density
 from pneunet.hifi.fem.mixed_field import MixedField
 from pneunet.hifi.fem.potential import PotentialEnergy, Term
 from pneunet.hifi.fem.stretch import PrincipalStretch
@@ -84,8 +84,7 @@ class CellProblem(MixedField):
         #: hifi.cell.symmetry.SymmetryClass: that of the free state, then the others
         self.classes = [SymmetryClass(self, chi, rollers or {}, used) for chi in characters(self.turns)]
         self._place()
-        solid = np.isin(self.cell_tags.values, (tags.BODY, tags.LAYER))
-        self.stretch = PrincipalStretch(self, self.cell_tags.indices[solid])
+        self.stretch = PrincipalStretch(self, [(tags.BODY, tags.LAYER)])
 
     def _place(self):
         """What depends on where the nodes are."""
@@ -152,10 +151,12 @@ class CellProblem(MixedField):
         whole = fem.Constant(self.mesh, PETSc.ScalarType(float(len(self.turns))))
         mu = fem.Constant(self.mesh, PETSc.ScalarType(segment.material.mu))
         solids = ((tags.BODY, segment.material), (tags.LAYER, segment.layer_material))
+        #: {cell tag: {name: fem.Constant}} of the solids' laws
+        self.constants = {tag: constants_of(self.mesh, m) for tag, m in solids if m is not None}
         terms = [
-            Term(whole * energy_density(self.mesh, material, F, self.p), self.cells(tag))
-            for tag, material in solids
-            if material is not None
+            Term(whole * energy_density(self.mesh, m, F, self.p, self.constants[tag]), self.cells(tag))
+            for tag, m in solids
+            if m is not None
         ]
         resting = AIR_STIFFNESS * mu / 2 * (ufl.inner(F, F) - 2 * J)
         terms.append(Term(whole * resting, air, whole * self.pressure * J))
@@ -212,6 +213,21 @@ class CellProblem(MixedField):
         """What `tangent` gives, of another class at the state of the last tangent."""
         each = self.classes[number]
         return each.bordered(self._matrix), *self._by_strains(each)
+
+    def second_derivative(self, ways: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+        """(r, r) sum over the classes of Z^T d2Pi Z at the current state, Z = (unknowns, r), (6, r) of each
+        of `ways`."""
+        self.assemble(self._matrix, self._potential.tangents)
+        indptr, indices, values = self._matrix.getValuesCSR()
+        matrix, touching = sp.csr_matrix((values, indices, indptr)), self.contact.tangent()
+        first = np.vstack(ways[0])
+        total = first.T @ (touching @ first)
+        for each, (unknowns, strains) in zip(self.classes, ways):
+            spread = np.where(each.reduced >= 0, each.signs, 0.0)[:, None] * unknowns[each.reduced]
+            mixed, curvature = self._by_strains(each)
+            crossed = unknowns.T @ mixed @ strains
+            total += spread.T @ (matrix @ spread) + crossed + crossed.T + strains.T @ curvature @ strains
+        return total
 
     def _by_strains(self, each):
         """(d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6)) in a class."""

@@ -75,14 +75,21 @@ def _expanded(law, F):
     return energy
 
 
-def energy_density(mesh: Mesh, material: Material, F: Expr, p: Expr) -> Expr:
+def constants_of(mesh: Mesh, material: Material) -> dict[str, fem.Constant]:
+    """{name: constant of `mesh`} of the law's parameters and 1/K, 0 for an incompressible material: all
+    materials of a law share what is compiled."""
+    names = (*material.constants, "bulk_compliance")
+    return {name: fem.Constant(mesh, PETSc.ScalarType(getattr(material, name))) for name in names}
+
+
+def energy_density(
+    mesh: Mesh, material: Material, F: Expr, p: Expr, constants: dict[str, fem.Constant] | None = None
+) -> Expr:
     """W(F) + p (J - 1) - p^2/(2K) in MPa: stationary at J - 1 = p/K, stored energy at equilibrium.
 
-    The law's parameters are constants of `mesh`, so that all materials of a law share what is compiled; 1/K
-    is 0 for an incompressible one.
+    constants: `constants_of` the material, for who wants to change them.
     """
-    names = (*material.constants, "bulk_compliance")
-    constants = {name: fem.Constant(mesh, PETSc.ScalarType(getattr(material, name))) for name in names}
+    constants = constants or constants_of(mesh, material)
     law = unchecked(type(material), **constants)
     if hasattr(law, "energy_of"):
         energy = law.energy_of(F)

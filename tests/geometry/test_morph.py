@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.geometry.cad.morph import moved
 from pneunet.geometry.grids.cell import cell_grid
+from pneunet.geometry.grids.morph import Morph
 from pneunet.geometry.parameters import ONE_SIDED
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import DIRECTIONS, changed, direction_matrix, normal_pitch, shape_numbers
@@ -32,12 +32,12 @@ def test_faces_of_one_cell_go_to_those_of_the_other(segment):
         return np.column_stack([y * s.cot + s.chamber_thickness / 2 / s.sin, y, z])
 
     start = on_wall(segment)
-    there = moved(start, segment, other)
+    there = Morph(segment, other)(start)
     assert there[:, 0] - there[:, 1] * other.cot == pytest.approx(
         np.full(4, other.chamber_thickness / 2 / other.sin)
     )
     assert there[[0, -1]] == pytest.approx(on_wall(other)[[0, -1]])
-    assert moved(there, other, segment) == pytest.approx(start)
+    assert Morph(other, segment)(there) == pytest.approx(start)
 
 
 @pytest.mark.parametrize("segment", BODIES, ids=lambda s: s.kind)
@@ -53,11 +53,11 @@ def test_a_cell_stays_periodic_and_keeps_its_orientation(segment):
     for name, change in DIRECTIONS[segment.kind].items():
         other = changed(segment, change, 1.0 if name == "angle" else 0.02)
         step = np.array([segment.pitch, 0, 0])
-        assert moved(x + step, segment, other) - moved(x, segment, other) == pytest.approx(
+        assert Morph(segment, other)(x + step) - Morph(segment, other)(x) == pytest.approx(
             np.tile([other.pitch, 0, 0], (200, 1)), abs=1e-9
         )
         h = 1e-6
-        columns = [(moved(x + h * e, segment, other) - moved(x, segment, other)) / h for e in np.eye(3)]
+        columns = [(Morph(segment, other)(x + h * e) - Morph(segment, other)(x)) / h for e in np.eye(3)]
         assert (np.linalg.det(np.stack(columns, axis=2)) > 0.5).all()
 
 
@@ -68,11 +68,11 @@ def test_directions_keep_the_normal_pitch_and_are_what_the_matrix_says(segment):
     for change, row in zip(DIRECTIONS[segment.kind].values(), rows):
         other = changed(segment, change, 0.01)
         assert normal_pitch(other) == pytest.approx(normal_pitch(segment))
-        assert shape_numbers(other) - shape_numbers(segment) == pytest.approx(0.01 * row, abs=1e-12)
+        assert shape_numbers(other) - shape_numbers(segment) == pytest.approx(0.01 * row[:13], abs=1e-12)
 
 
 @pytest.mark.parametrize("segment", BODIES, ids=lambda s: s.kind)
 def test_the_grid_of_one_cell_goes_to_that_of_the_other(segment):
     other = replace(segment, angle=segment.angle + 0.5, width=1.01 * segment.width, roof=1.02 * segment.roof)
     grids = [cell_grid(s, 1.7).mesh(air=True).points for s in (segment, other)]
-    assert moved(grids[0], segment, other) == pytest.approx(grids[1], abs=1e-12)
+    assert Morph(segment, other)(grids[0]) == pytest.approx(grids[1], abs=1e-12)

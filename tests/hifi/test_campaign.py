@@ -139,6 +139,7 @@ def test_a_case_on_a_grid_takes_half_a_cell_until_walls_touch(gap, part, tmp_pat
         "material": material_to_table(segment.material),
         "mesh": {"mesh_size_mm": 6.0, "element": "hexahedra"},
         **{"levels": 2, "top_pressure": 0.05, "limit_share": 0.8, "prescribed": [], "slopes": False},
+        **{"stiffness_slopes": False, "apart": False},
     }
     facts = solve_campaign_case(inputs, tmp_path)
     last = json.loads((tmp_path / "states.json").read_text())[-1]

@@ -17,7 +17,7 @@ from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.cell.file import CellCase
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.run import solve_cell
-from pneunet.hifi.cell.shape_slopes import ShapeSlopes
+from pneunet.hifi.cell.slopes import Slopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.fem import surface
 from pneunet.hifi.path.control import LoadControl
@@ -100,7 +100,7 @@ def test_a_part_of_the_cell_has_the_whole_s_derivatives_by_the_shape(tmp_path):
         path = EquilibriumPath(system, LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
         run_steps(path, 0.005, StepSize(first=0.005, smallest=1e-4))
         system.factorise()
-        slopes.append(ShapeSlopes(problem).of(system))
+        slopes.append(Slopes(problem).of(system))
         system.destroy()
     for whole, part in zip(*slopes):
         assert part == pytest.approx(whole, rel=1e-3, abs=1e-4 * np.abs(whole).max())

@@ -15,8 +15,9 @@ from pneunet.base.files.atomic import room_in, write_text
 from pneunet.base.files.dataset import DIRECTIONS, UPPER, CellData, columns, write_dataset
 from pneunet.base.files.datasheet import datasheet
 from pneunet.base.files.record import revision, write_record
+from pneunet.base.materials.laws import Yeoh
 from pneunet.base.system.interrupts import Interrupted
-from pneunet.geometry.shape_numbers import SHAPE, direction_matrix, normal_pitch, shape_numbers
+from pneunet.geometry.shape_numbers import SHAPE, STIFFENING, direction_matrix, normal_pitch, shape_numbers
 from pneunet.hifi.fem.agreement import folder_of_all, on_rank_0
 from pneunet.hifi.runs.campaign.case import STATES
 from pneunet.hifi.runs.campaign.extension import Known, taken_over
@@ -131,6 +132,7 @@ class Gathering:
             "kinds": list(c.kinds),
             "meshes": [{"name": m.name, **m.settings} for m in c.meshes],
             "shape": list(SHAPE),
+            "stiffening": list(STIFFENING),
             "directions": {kind: direction_matrix(kind).tolist() for kind in c.kinds},
             "statuses": list(STATUSES),
             "reasons": reasons,
@@ -162,6 +164,7 @@ def _case_row(campaign, design, record):
         "held_out": design.held_out,
         "mesh": campaign.meshes.index(design.mesh),
         "shape": shape_numbers(design.segment),
+        "stiffening": stiffening(design.segment.material),
         "normal_pitch_mm": normal_pitch(design.segment),
         "status": STATUSES.index(record["status"]),
         **over_mu,
@@ -170,6 +173,11 @@ def _case_row(campaign, design, record):
         "seconds": result.get("cpu_seconds", record["seconds"]),
         "missing": len(result.get("missing", [])),
     }
+
+
+def stiffening(material: Yeoh) -> tuple[float, float]:
+    """STIFFENING of a sample's material."""
+    return material.c20 / material.c10, material.c30 / material.c10
 
 
 def _state_row(segment, state):

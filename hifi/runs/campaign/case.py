@@ -21,7 +21,7 @@ from pneunet.geometry.cad.cell import mesh_cell
 from pneunet.geometry.cad.grid import grid_cell
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.hifi.cell.problem import CellProblem
-from pneunet.hifi.cell.shape_slopes import ShapeSlopes
+from pneunet.hifi.cell.slopes import Slopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.contact.touch import Load, TouchWatch
@@ -30,6 +30,7 @@ from pneunet.hifi.path.control import LoadControl, VolumeControl
 from pneunet.hifi.path.equilibrium import EquilibriumPath, PathState
 from pneunet.hifi.path.newton import NewtonOptions
 from pneunet.hifi.path.stepping import StepSize, run_steps
+from pneunet.hifi.runs.campaign.sample import typical
 
 STATES = "states.json"
 #: the path is only a guide for what is computed on it
@@ -39,7 +40,7 @@ FIRST, LARGEST, FURTHEST = 0.03, 0.5, 30.0
 #: a prescribed state is walked to in steps of at most this part of the way
 HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.1
 #: free states whose stiffness is differentiated by the shape, where the strains are: every n-th
-STIFFNESS_SLOPES_EVERY = 4
+STIFFNESS_SLOPES_EVERY = 3
 REST = np.eye(6)[0]
 
 
@@ -53,7 +54,8 @@ class _Enough(Exception):
 
 def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     """Case of hifi.runs.cases; inputs: {"segment", "material", "mesh", "levels", "top_pressure",
-    "limit_share", "prescribed", "slopes": whether free states are differentiated by the shape}.
+    "limit_share", "prescribed", "slopes": whether free states are differentiated by shape and stiffening,
+    "stiffness_slopes": whether their stiffness is too, "apart": whether the path ends where walls touch}.
 
     directory/states.json is rewritten with every state. Returns facts: mesh, limit pressure (MPa, None where
     there was none), top pressure, first touch of walls, why prescribed states are missing, CPU time.
@@ -65,8 +67,9 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     # half turns spare most of a grid, but contact needs the whole, and so do strains without the symmetry
     half_turns = inputs["mesh"].get("element") == "hexahedra" and not inputs["prescribed"]
     for part in [True] * half_turns + [False]:
-        problem, mesh = _problem(segment, inputs["mesh"], directory / "cell.npz", part)
-        sampler = Sampler(problem, directory, inputs["slopes"])
+        problem, mesh = _problem(segment, inputs["mesh"], directory / "cell.npz", part, inputs["apart"])
+        every = STIFFNESS_SLOPES_EVERY if inputs["stiffness_slopes"] else 0
+        sampler = Sampler(problem, directory, inputs["slopes"], every, inputs["apart"])
         try:
             top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
             sampler.free(top * np.arange(inputs["levels"] + 1) / inputs["levels"])
@@ -84,27 +87,34 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     }
 
 
-def _problem(segment, settings, path, part):
-    """(CellProblem, facts of its mesh); of a part of the cell without contact."""
+def _problem(segment, settings, path, part, apart):
+    """(CellProblem, facts of its mesh); of a part of the cell, or one whose walls stay apart, without
+    contact."""
     size, edge = settings["mesh_size_mm"], settings.get("edge_size_mm")
     if settings.get("element") == "hexahedra":
-        facts = grid_cell(segment, size, path, edge, part=part)
+        like = typical(segment.kind) if settings.get("alike") else None
+        facts = grid_cell(segment, size, path, edge, part=part, like=like)
     else:
         facts = mesh_cell(segment, size, path, edge_size=edge)
-    problem = CellProblem(segment, path, contact=None if part else WallPenalty())
+    problem = CellProblem(segment, path, contact=None if part or apart else WallPenalty())
     for written in (path, path.with_suffix(".msh")):
         written.unlink()
     return problem, facts | {"unknowns": problem.unknowns}
 
 
 class Sampler:
-    """The states of one cell. _Touched where walls meet in a problem without contact."""
+    """The states of one cell. _Touched where walls meet in a problem without contact.
 
-    def __init__(self, problem, directory, slopes=False):
-        self.problem, self.directory = problem, directory
+    slopes: free states are differentiated, every n-th one's stiffness too (0: none). apart: walls that meet
+    are the path's end.
+    """
+
+    def __init__(self, problem, directory, slopes=False, stiffness_slopes_every=0, apart=False):
+        self.problem, self.directory, self.apart = problem, directory, apart
+        self.every = stiffness_slopes_every
         self.mu = problem.segment.material.mu
         self.system = CellSystem(problem)
-        self.slopes = ShapeSlopes(problem) if slopes else None
+        self.slopes = Slopes(problem) if slopes else None
         self.options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
         self.walked = []  # PathStates of the scout, their parameter the pressure
         self.kept = []  # (CellState, state array) of the free states
@@ -112,7 +122,7 @@ class Sampler:
 
     def scout(self, top: float, share: float) -> tuple[float, float | None]:
         """(top pressure, limit pressure or None), MPa: `top`, or `share` of the limit load where that is
-        less."""
+        less; or, of walls that stay apart, where they nearly touch."""
         system, limit = self.system, None
         path = EquilibriumPath(
             system,
@@ -124,7 +134,10 @@ class Sampler:
         self.walked = [self._walked(path)]
 
         def keep(step):
-            self._watch(system.walls.distance())
+            if self._met(system.walls.distance()):
+                if not self.apart:
+                    raise _Touched
+                raise _Enough
             self.walked.append(self._walked(path))
             if path.limit_points or system.load >= top:
                 raise _Enough
@@ -142,15 +155,16 @@ class Sampler:
             limit = path.limit_points[0].load
         highest = max(a.load for a in self.walked)
         if limit is None and highest < top:
+            if self.apart:
+                return highest, None
             limit = highest
         if limit is not None and share * limit < top:
             return share * limit, limit
         return top, limit
 
-    def _watch(self, distance):
-        """Walls that are closer than where contact begins to push have met."""
-        if self.problem.contact.gaps == 0 and distance < WallPenalty().onset * self.problem.segment.gap:
-            raise _Touched
+    def _met(self, distance):
+        """Whether walls without contact are closer than where it begins to push."""
+        return self.problem.contact.gaps == 0 and distance < WallPenalty().onset * self.problem.segment.gap
 
     def destroy(self) -> None:
         self.system.destroy()
@@ -189,7 +203,8 @@ class Sampler:
     def _record(self, array, residual, kind, system=None):
         system = system or self.system
         state = system.measure()
-        self._watch(state.wall_distance)
+        if self._met(state.wall_distance) and not self.apart:
+            raise _Touched
         slopes = {}
         if kind == "free":
             slopes = self._slopes(system, len(self.kept))
@@ -216,10 +231,10 @@ class Sampler:
         write_text(self.directory / STATES, json.dumps(self.states, default=float))
 
     def _slopes(self, system, number):
-        """What a row says of the free state's derivatives by the shape: hifi.cell.shape_slopes."""
+        """What a row says of the free state's derivatives: hifi.cell.slopes."""
         if not self.slopes:
             return {}
-        strains, stiffness = self.slopes.of(system, stiffness=number % STIFFNESS_SLOPES_EVERY == 0)
+        strains, stiffness = self.slopes.of(system, stiffness=bool(self.every) and number % self.every == 0)
         return {"strain_slopes": strains.tolist()} | (
             {} if stiffness is None else {"stiffness_slopes": stiffness.tolist()}
         )

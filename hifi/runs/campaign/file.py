@@ -50,24 +50,32 @@ class Mesh(Checked):
     hexahedra, with a layer of edge_size at planes where stresses are singular. every: n-th designs, from the
     first, are computed on it, and further ones where it is 1.
 
-    prescribed: states at prescribed strains of every prescribed_every-th of those. slopes: whether the free
-    states of designs that are not held out are differentiated by the shape.
+    alike: on grids, all designs have the elements of hifi.runs.campaign.sample.typical, for which the sizes
+    are then meant. prescribed: states at prescribed strains of every prescribed_every-th of those. slopes,
+    stiffness_slopes: whether the free states of designs that are not held out are differentiated by shape and
+    stiffening, and their stiffness too. contact: whether walls that touch are held apart; else the path ends
+    there.
     """
 
     name: str = quantity(None)
     mesh_size: float = quantity("mm", low=0.02, high=20)
     edge_size: float | None = quantity("mm", None, low=0.02, high=20)
     element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
+    alike: bool = quantity(None, False)
     every: int = quantity(None, 1, low=1, high=10_000)
     prescribed: int = quantity(None, 0, low=0, high=PLACES)
     prescribed_every: int = quantity(None, 1, low=1, high=10_000)
     slopes: bool = quantity(None, False)
+    stiffness_slopes: bool = quantity(None, False)
+    contact: bool = quantity(None, True)
 
     @property
     def settings(self) -> dict[str, Any]:
         """What makes the mesh, in file units; tetrahedra are not mentioned."""
         sizes = {key: value for key, value in to_table(self).items() if key.endswith("_mm")}
-        return sizes if self.element == "tetrahedra" else sizes | {"element": self.element}
+        if self.element == "tetrahedra":
+            return sizes
+        return sizes | {"element": self.element} | ({"alike": True} if self.alike else {})
 
     def prescribed_of(self, index: int) -> int:
         """How many prescribed states the design has."""
@@ -135,7 +143,11 @@ def read_campaign(path: str | Path) -> Campaign:
                 judge = not at_edges and is_held_out(index, numbers.held_out_every)
                 for mesh in meshes:
                     if mesh.every == 1 or index % mesh.every == 0 and index < count:
-                        settings = common | {"slopes": mesh.slopes and not judge}
+                        settings = common | {
+                            "slopes": mesh.slopes and not judge,
+                            "stiffness_slopes": mesh.stiffness_slopes and not judge,
+                            "apart": not mesh.contact,
+                        }
                         case = _case(
                             kind,
                             index,

@@ -8,8 +8,9 @@ is near an edge: edge designs, another sequence, are crowded towards them. Dimen
 apart are tied, which leaves fewer directions to fill:
 - the side wall is as thick as the top wall, and in one-sided segments so is the roof of the channel;
 - the cavity's floor lies at the channel's top in one-sided segments; in twisting ones anywhere between axis
-and channel's top. Angles above 90 degrees are mirror images. The material is neo-Hookean with mu = 1 MPa:
-only P/mu counts.
+and channel's top. Angles above 90 degrees are mirror images. The material is Yeoh's with mu = 1 MPa:
+only P/mu counts, and how it stiffens. The third constant, which most silicones lack, is 0 in half of the
+designs.
 """
 
 from dataclasses import dataclass
@@ -17,14 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm, qmc
 
-from pneunet.base.materials.laws import NeoHookean
+from pneunet.base.materials.laws import Yeoh
 from pneunet.geometry.parameters import KINDS, ONE_SIDED, TWISTING, Segment
 
 MU = 1.0
-#: kind -> variable -> (low, high); degrees and mm. floor_share: of half the channel's height
+#: kind -> variable -> (low, high); degrees and mm. floor_share: of half the channel's height. c30_over_c10:
+#: what is below 0 counts as 0
 RANGES = {
     ONE_SIDED: {
-        "angle_deg": (40.0, 90.0),
+        "angle_deg": (30.0, 90.0),
         "width_mm": (8.0, 16.0),
         "chamber_height_mm": (3.0, 8.0),
         "cavity_thickness_mm": (1.5, 3.0),
@@ -34,6 +36,8 @@ RANGES = {
         "base_thickness_mm": (1.5, 4.0),
         "channel_width_mm": (2.0, 4.5),
         "channel_height_mm": (1.5, 2.5),
+        "c20_over_c10": (0.0, 0.13),
+        "c30_over_c10": (-0.008, 0.008),
     },
 }
 RANGES[TWISTING] = {name: both for name, both in RANGES[ONE_SIDED].items() if name != "base_thickness_mm"} | {
@@ -70,11 +74,19 @@ def segments(
     points = _sobol(len(names), count, seed + KINDS.index(kind))
     if at_edges:
         points = np.sin(np.pi / 2 * points) ** 2
-    return [_segment(kind, dict(zip(names, (low + p * (high - low)).round(4).tolist()))) for p in points]
+    return [_segment(kind, dict(zip(names, (low + p * (high - low)).round(5).tolist()))) for p in points]
+
+
+def typical(kind: str) -> Segment:
+    """The Segment in the middle of RANGES, but for its angle of 45 degrees: the more slanted, the more
+    elements a chamber needs."""
+    return _segment(kind, {name: sum(both) / 2 for name, both in RANGES[kind].items()} | {"angle_deg": 45.0})
 
 
 def _segment(kind, v):
     outer, half = v["outer_wall_mm"], v["channel_height_mm"] / 2
+    c10 = MU / 2
+    material = Yeoh(c10=c10, c20=v["c20_over_c10"] * c10, c30=max(v["c30_over_c10"], 0.0) * c10)
     return Segment(
         kind,
         v["angle_deg"],
@@ -92,7 +104,7 @@ def _segment(kind, v):
         channel_height=v["channel_height_mm"],
         cavity_floor=half * v.get("floor_share", 1.0),
         end_margin=4.0,
-        material=NeoHookean(mu=MU),
+        material=material,
     )
 
 

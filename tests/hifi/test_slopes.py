@@ -6,11 +6,11 @@ from mpi4py import MPI
 
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry.cad.cell import mesh_cell
-from pneunet.geometry.cad.morph import moved
+from pneunet.geometry.grids.morph import Morph
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import DIRECTIONS, changed
 from pneunet.hifi.cell.problem import CellProblem
-from pneunet.hifi.cell.shape_slopes import ShapeSlopes
+from pneunet.hifi.cell.slopes import Slopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.path.control import LoadControl
@@ -41,7 +41,7 @@ def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_pa
     problem = CellProblem(segment, tmp_path / "cell.npz", contact=WallPenalty())
     home = problem.mesh.geometry.x.copy()
     system, state = solved(problem, pressure)
-    strains, stiffness = ShapeSlopes(problem).of(system)
+    strains, stiffness = Slopes(problem).of(system)
     # all is where it was: measured again, nothing has changed
     assert (problem.mesh.geometry.x == home).all() and problem.segment == segment
     system.factorise()
@@ -53,7 +53,7 @@ def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_pa
         ends = []
         for sign in (1, -1):
             other = changed(segment, DIRECTIONS[segment.kind][direction], sign * step)
-            problem.move(other, moved(home, segment, other))
+            problem.move(other, Morph(segment, other)(home))
             there, found = solved(problem, pressure)
             ends.append(numbers(found))
             there.destroy()
