@@ -8,7 +8,7 @@ are put together from all. With half turns only a part of the cell is meshed, an
 Without them there is one class.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,7 +50,7 @@ class Orbits:
     pitch takes a node's image to, -1 where the mesh has none."""
 
     def __init__(self, points: np.ndarray, pitch: float, turns: np.ndarray):
-        tree, wrapped = _periodic_tree(points, pitch)
+        tree, wrapped = periodic_tree(points, pitch)
         pairs = tree.query_pairs(_TOLERANCE, output_type="ndarray")
         graph = sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
         _, labels = connected_components(graph, directed=False)
@@ -73,7 +73,7 @@ class Orbits:
         return there.min(axis=0), signs[which], zero
 
 
-def _periodic_tree(points, pitch):
+def periodic_tree(points: np.ndarray, pitch: float) -> tuple[cKDTree, Callable[[np.ndarray], np.ndarray]]:
     """(tree of the points with X1 taken modulo the pitch, function that wraps others the same way)."""
     low, far = points[:, 1:].min(axis=0), 4 * np.abs(points).max(axis=0)[1:] + 1.0
 

@@ -253,7 +253,8 @@ class CellSystem:
             _, part, more = self.of_class(number)
             stiffness += part
             unstable += more
-        _, slope = self._parts()
+        # what the symmetry forbids is 0 over the whole cell; over a part of it the rest is not
+        slope = self._parts()[1] * self.problem.classes[0].strains
         q = self._x[-6:]
         return CellState(
             float(self.problem.pressure.value),

@@ -1,7 +1,7 @@
 """Largest principal stretch of a deformed body.
 
-At re-entrant edges it has no bound: the smaller the elements, the larger. Its mean over the most stretched part of
-a stated size has one, and converges as the strains do.
+At re-entrant edges it has no bound: the smaller the elements, the larger. Its mean over the most stretched
+part of a stated size has one, and converges with the mesh.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ from pneunet.hifi.fem.mixed_field import MixedField
 
 #: of a solid's volume at rest, over which its largest stretch is averaged
 MOST_STRETCHED = 0.01
-#: (points, weights) inside the reference cell, since re-entrant edges are singular: the 4-point rule of degree 2
-#: on the tetrahedron, the Gauss points of the tangent on the hexahedron: with 8 points large elements would see
-#: less of what is steep at edges
+#: (points, weights) inside the reference cell, since re-entrant edges are singular: the 4-point rule of
+#: degree 2 on the tetrahedron; on the hexahedron the 27 Gauss points of the tangent: with 8, large elements
+#: would miss what is steep at edges
 _A, _B = 0.5854101966249685, 0.1381966011250105
 RULES = {
     "tetrahedron": (
@@ -81,8 +81,8 @@ class PrincipalStretch:
 
 
 def upper_mean(values: np.ndarray, weights: np.ndarray, fraction: float, comm: MPI.Comm) -> float:
-    """Mean of all ranks' `values` (n,) over the part `fraction` of their `weights` (n,) where they are largest;
-    collective."""
+    """Mean of all ranks' `values` (n,) over the part `fraction` of their `weights` (n,) where they are
+    largest; collective."""
     part = fraction * comm.allreduce(weights.sum(), op=MPI.SUM)
     found = comm.allgather(_largest(values, weights, part))
     values, weights = _largest(*(np.concatenate(each) for each in zip(*found)), part)

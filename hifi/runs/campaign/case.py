@@ -23,6 +23,7 @@ from pneunet.geometry.designfile import segment_from_table
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.slopes import Slopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.cell.unfolding import unfolding
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.contact.touch import Load, TouchWatch
 from pneunet.hifi.fem.solver import NotConverged
@@ -35,8 +36,10 @@ from pneunet.hifi.runs.campaign.sample import typical
 STATES = "states.json"
 #: the path is only a guide for what is computed on it
 SCOUT_TOLERANCE = 1e-5
-#: of the volume at rest: first and largest step of the scout, and how far it goes
+#: of the volume at rest: first and largest step of the scout, and how far it goes; and the largest step on
+#: grids with edge layers, where strains at edges are large (measured: 4 factorisations in place of 19)
 FIRST, LARGEST, FURTHEST = 0.03, 0.5, 30.0
+LARGEST_WITH_LAYERS = 0.12
 #: a prescribed state is walked to in steps of at most this part of the way
 HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.1
 #: free states whose stiffness is differentiated by the shape, where the strains are: every n-th
@@ -65,17 +68,20 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
         inputs["segment"], "segment", material_from_table(inputs["material"], "material")
     )
     # half turns spare most of a grid, but contact needs the whole, and so do strains without the symmetry
-    half_turns = inputs["mesh"].get("element") == "hexahedra" and not inputs["prescribed"]
-    for part in [True] * half_turns + [False]:
-        problem, mesh = _problem(segment, inputs["mesh"], directory / "cell.npz", part, inputs["apart"])
+    settings, path, apart = inputs["mesh"], directory / "cell.npz", inputs["apart"]
+    for part in [True] * (settings.get("element") == "hexahedra") + [False]:
+        problem, mesh = _problem(segment, settings, path, part, apart)
         every = STIFFNESS_SLOPES_EVERY if inputs["stiffness_slopes"] else 0
-        sampler = Sampler(problem, directory, inputs["slopes"], every, inputs["apart"])
+        largest = LARGEST_WITH_LAYERS if "edge_size_mm" in settings else LARGEST
+        sampler = Sampler(problem, directory, inputs["slopes"], every, apart, largest)
         try:
             top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
             sampler.free(top * np.arange(inputs["levels"] + 1) / inputs["levels"])
             break
         except _Touched:
             sampler.destroy()
+    if part and inputs["prescribed"]:
+        sampler.unfold(_problem(segment, settings, path, False, apart)[0])
     missing = sampler.prescribed(inputs["prescribed"])
     return {
         "mesh": mesh,
@@ -106,12 +112,14 @@ class Sampler:
     """The states of one cell. _Touched where walls meet in a problem without contact.
 
     slopes: free states are differentiated, every n-th one's stiffness too (0: none). apart: walls that meet
-    are the path's end.
+    are the path's end. largest_step: of the scout, over the volume at rest.
     """
 
-    def __init__(self, problem, directory, slopes=False, stiffness_slopes_every=0, apart=False):
+    def __init__(
+        self, problem, directory, slopes=False, stiffness_slopes_every=0, apart=False, largest_step=LARGEST
+    ):
         self.problem, self.directory, self.apart = problem, directory, apart
-        self.every = stiffness_slopes_every
+        self.every, self.largest_step = stiffness_slopes_every, largest_step
         self.mu = problem.segment.material.mu
         self.system = CellSystem(problem)
         self.slopes = Slopes(problem) if slopes else None
@@ -144,7 +152,10 @@ class Sampler:
 
         try:
             run_steps(
-                path, FURTHEST * rest, StepSize(FIRST * rest, 1e-3 * FIRST * rest, LARGEST * rest), keep
+                path,
+                FURTHEST * rest,
+                StepSize(FIRST * rest, 1e-3 * FIRST * rest, self.largest_step * rest),
+                keep,
             )
         except _Enough:
             pass
@@ -238,6 +249,13 @@ class Sampler:
         return {"strain_slopes": strains.tolist()} | (
             {} if stiffness is None else {"stiffness_slopes": stiffness.tolist()}
         )
+
+    def unfold(self, whole: CellProblem) -> None:
+        """Go on with the whole cell of which the problem is a part."""
+        unfolded = unfolding(self.problem, whole)
+        self.kept = [(state, unfolded(array)) for state, array in self.kept]
+        self.system.destroy()
+        self.problem, self.system, self.slopes = whole, CellSystem(whole), None
 
     def prescribed(self, wanted: list[dict]) -> list[str]:
         """Record the states of `wanted` ([{"level", "amplitude", "direction"}]); returns why some are missing

@@ -51,10 +51,10 @@ class Mesh(Checked):
     first, are computed on it, and further ones where it is 1.
 
     alike: on grids, all designs have the elements of hifi.runs.campaign.sample.typical, for which the sizes
-    are then meant. prescribed: states at prescribed strains of every prescribed_every-th of those. slopes,
-    stiffness_slopes: whether the free states of designs that are not held out are differentiated by shape and
-    stiffening, and their stiffness too. contact: whether walls that touch are held apart; else the path ends
-    there.
+    are then meant. levels: where they are not the campaign's. prescribed: states at prescribed strains of
+    every prescribed_every-th of those. slopes, stiffness_slopes: whether the free states of designs that are
+    not held out are differentiated by shape and stiffening, and their stiffness too. contact: whether walls
+    that touch are held apart; else the path ends there.
     """
 
     name: str = quantity(None)
@@ -62,6 +62,7 @@ class Mesh(Checked):
     edge_size: float | None = quantity("mm", None, low=0.02, high=20)
     element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
     alike: bool = quantity(None, False)
+    levels: int | None = quantity(None, None, low=2, high=100)
     every: int = quantity(None, 1, low=1, high=10_000)
     prescribed: int = quantity(None, 0, low=0, high=PLACES)
     prescribed_every: int = quantity(None, 1, low=1, high=10_000)
@@ -144,6 +145,7 @@ def read_campaign(path: str | Path) -> Campaign:
                 for mesh in meshes:
                     if mesh.every == 1 or index % mesh.every == 0 and index < count:
                         settings = common | {
+                            "levels": mesh.levels or numbers.levels,
                             "slopes": mesh.slopes and not judge,
                             "stiffness_slopes": mesh.stiffness_slopes and not judge,
                             "apart": not mesh.contact,
