@@ -253,8 +253,7 @@ class CellSystem:
             _, part, more = self.of_class(number)
             stiffness += part
             unstable += more
-        # what the symmetry forbids is 0 over the whole cell; over a part of it the rest is not
-        slope = self._parts()[1] * self.problem.classes[0].strains
+        _, slope = self._parts()
         q = self._x[-6:]
         return CellState(
             float(self.problem.pressure.value),

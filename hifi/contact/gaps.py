@@ -40,8 +40,8 @@ class Side:
         return {(self.number, *name): k for name, k in zip(t.name.tolist(), t.area * t.slope)}
 
     def chained(self, by_position: np.ndarray) -> np.ndarray:
-        """(pairs, m) derivatives by `columns` from those by the nodes' positions (pairs, 12, 3)."""
-        return by_position.reshape(-1, 36)
+        """(pairs, m) derivatives by `columns` from those by the nodes' positions (pairs, k, 3)."""
+        return by_position.reshape(len(by_position), -1)
 
     def bend(self) -> np.ndarray:
         """(pairs, m, m) second derivatives of the energy at fixed pressures, but for what couples pairs."""
@@ -59,7 +59,7 @@ class Side:
         return self._sparse(self.chained(self.touching.forces), np.zeros(pairs, int), 1).T.tocsr()
 
     def _by_point(self, by_position):
-        """Sparse (points, size) of what pairs (pairs, 12, 3) add up to."""
+        """Sparse (points, size) of what pairs (pairs, k, 3) add up to."""
         return self._sparse(self.chained(by_position), self.touching.point, len(self.touching.area))
 
     @cached_property

@@ -47,10 +47,6 @@ STIFFNESS_SLOPES_EVERY = 3
 REST = np.eye(6)[0]
 
 
-class _Touched(Exception):
-    """Walls have met in a cell that knows no contact."""
-
-
 class _Enough(Exception):
     """The scout has seen the pressures it was sent for."""
 
@@ -67,19 +63,15 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     segment = segment_from_table(
         inputs["segment"], "segment", material_from_table(inputs["material"], "material")
     )
-    # half turns spare most of a grid, but contact needs the whole, and so do strains without the symmetry
+    # half turns spare most of a grid, but strains without the symmetry need the whole
     settings, path, apart = inputs["mesh"], directory / "cell.npz", inputs["apart"]
-    for part in [True] * (settings.get("element") == "hexahedra") + [False]:
-        problem, mesh = _problem(segment, settings, path, part, apart)
-        every = STIFFNESS_SLOPES_EVERY if inputs["stiffness_slopes"] else 0
-        largest = LARGEST_WITH_LAYERS if "edge_size_mm" in settings else LARGEST
-        sampler = Sampler(problem, directory, inputs["slopes"], every, apart, largest)
-        try:
-            top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
-            sampler.free(top * np.arange(inputs["levels"] + 1) / inputs["levels"])
-            break
-        except _Touched:
-            sampler.destroy()
+    part = settings.get("element") == "hexahedra"
+    problem, mesh = _problem(segment, settings, path, part, apart)
+    every = STIFFNESS_SLOPES_EVERY if inputs["stiffness_slopes"] else 0
+    largest = LARGEST_WITH_LAYERS if "edge_size_mm" in settings else LARGEST
+    sampler = Sampler(problem, directory, inputs["slopes"], every, apart, largest)
+    top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
+    sampler.free(top * np.arange(inputs["levels"] + 1) / inputs["levels"])
     if part and inputs["prescribed"]:
         sampler.unfold(_problem(segment, settings, path, False, apart)[0])
     missing = sampler.prescribed(inputs["prescribed"])
@@ -94,22 +86,21 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
 
 
 def _problem(segment, settings, path, part, apart):
-    """(CellProblem, facts of its mesh); of a part of the cell, or one whose walls stay apart, without
-    contact."""
+    """(CellProblem, facts of its mesh); without contact where walls stay apart."""
     size, edge = settings["mesh_size_mm"], settings.get("edge_size_mm")
     if settings.get("element") == "hexahedra":
         like = typical(segment.kind) if settings.get("alike") else None
         facts = grid_cell(segment, size, path, edge, part=part, like=like)
     else:
         facts = mesh_cell(segment, size, path, edge_size=edge)
-    problem = CellProblem(segment, path, contact=None if part or apart else WallPenalty())
+    problem = CellProblem(segment, path, contact=None if apart else WallPenalty())
     for written in (path, path.with_suffix(".msh")):
         written.unlink()
     return problem, facts | {"unknowns": problem.unknowns}
 
 
 class Sampler:
-    """The states of one cell. _Touched where walls meet in a problem without contact.
+    """The states of one cell.
 
     slopes: free states are differentiated, every n-th one's stiffness too (0: none). apart: walls that meet
     are the path's end. largest_step: of the scout, over the volume at rest.
@@ -143,8 +134,6 @@ class Sampler:
 
         def keep(step):
             if self._met(system.walls.distance()):
-                if not self.apart:
-                    raise _Touched
                 raise _Enough
             self.walked.append(self._walked(path))
             if path.limit_points or system.load >= top:
@@ -174,11 +163,8 @@ class Sampler:
         return top, limit
 
     def _met(self, distance):
-        """Whether walls without contact are closer than where it begins to push."""
-        return self.problem.contact.gaps == 0 and distance < WallPenalty().onset * self.problem.segment.gap
-
-    def destroy(self) -> None:
-        self.system.destroy()
+        """Whether walls that stay apart are closer than where contact would begin to push."""
+        return self.apart and distance < WallPenalty().onset * self.problem.segment.gap
 
     @staticmethod
     def _walked(path):
@@ -214,8 +200,6 @@ class Sampler:
     def _record(self, array, residual, kind, system=None):
         system = system or self.system
         state = system.measure()
-        if self._met(state.wall_distance) and not self.apart:
-            raise _Touched
         slopes = {}
         if kind == "free":
             slopes = self._slopes(system, len(self.kept))
