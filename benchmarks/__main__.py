@@ -29,7 +29,6 @@ from benchmarks import (
     paper,
     paper_page,
     people,
-    remeshed,
     rod,
     segmentation,
     segments,
@@ -95,7 +94,7 @@ PARTS = {
     ),
     "silicones": (
         silicones.silicones,
-        "cells of fitted silicones against neo-Hookean ones of the same initial modulus; some 4 minutes",
+        "the law against cells of fitted silicones; some 4 minutes",
     ),
     "segmentation": (
         segmentation.segmentation,
@@ -111,10 +110,6 @@ PARTS = {
     "design": (
         design.design,
         "designs of random targets and of the paper's raw curves, seconds, derivatives; some 15 minutes",
-    ),
-    "remeshed": (
-        remeshed.remeshed,
-        "held-out cells on another mesh of the same size, against the law's errors; some 15 minutes",
     ),
     "verification": (
         verification.verification,

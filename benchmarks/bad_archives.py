@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 
 from benchmarks.strange_files import Content, Random, pick, strange
-from pneunet.reduced.choice import DATA, SHIPPED
+from pneunet.reduced.choice import DATA_SET, SHIPPED
 
 
 @cache
 def archive(name: str) -> dict[str, np.ndarray]:
-    """The arrays of the law or of the smallest data set that come along."""
-    with np.load(SHIPPED if name == "law.npz" else DATA / "cells-slanted-v1.npz") as stored:
+    """The arrays of the law or of the data set that come along."""
+    with np.load(SHIPPED if name == "law.npz" else DATA_SET) as stored:
         return dict(stored)
 
 

@@ -35,24 +35,25 @@ def doubt():
 
 def agreement(law):
     """{"in range" and "around it": how a KindLaw's verdicts compare with those of its exact deviation}."""
-    from pneunet.geometry.shape_numbers import shapes_of
+    from pneunet.geometry.shape_numbers import numbers_of
     from pneunet.hifi.runs.campaign.sample import RANGES, segments
 
     random = np.random.default_rng(1)
-    shape, _ = shapes_of(segments(law.kind, RANGES[law.kind], DESIGNS, 12345))
+    shape, _ = numbers_of(segments(law.kind, RANGES[law.kind], DESIGNS, 12345))
     pressure = random.uniform(0, TOP, DESIGNS)
     further = shape.mean(axis=0) + random.uniform(1, OUT, (DESIGNS, 1)) * (shape - shape.mean(axis=0))
+    further[:, :13] = np.maximum(further[:, :13], 0.02)
     inside = (law.excess(shape, pressure)[:, [*range(len(law.low)), -1]] == 0).all(axis=1)
     return {
         "in range": compared(law, shape[inside], pressure[inside]),
-        "around it": compared(law, np.maximum(further, 0.02), random.uniform(0, 2 * TOP, DESIGNS)),
+        "around it": compared(law, further, random.uniform(0, 2 * TOP, DESIGNS)),
     }
 
 
 def compared(law, shape, pressure):
     """The share of states whose verdict is the exact one's; the largest exact deviation, over the largest
     that counts as known, of those told known; and the shares doubted and decided by landmarks."""
-    _, _, there = law.path.at(shape, pressure, law.level)
+    _, _, there = law.path.at(shape, pressure)
     exact = law.path.learned.processes[0].deviation(there)[:, 0]
     told = law.path.deviation(there, law.known) > law.known
     return {
@@ -73,17 +74,17 @@ def costs():
 
 
 def costs_of(segment):
-    from pneunet.geometry.shape_numbers import shape_numbers
+    from pneunet.geometry.shape_numbers import numbers_of
     from pneunet.reduced import read_law
     from pneunet.reduced.choice import SHIPPED
 
-    law, shape, pressure = read_law(SHIPPED), shape_numbers(segment)[None], np.array([0.1])
+    law, (shape, _), pressure = read_law(SHIPPED), numbers_of([segment]), np.array([0.1])
     section, known = law.of(segment), law.kinds[segment.kind]
     doubted = replace(known, doubt=1e-6)  # whatever landmarks say, all inducing points are asked
     start = time.process_time()
     doubted.excess(shape, pressure)
     first = time.process_time() - start
-    _, beyond, there = known.path.at(shape, pressure, known.level)
+    _, beyond, there = known.path.at(shape, pressure)
     state = shape, pressure, there, beyond
     section.half_width(PRESSURE)
     return {

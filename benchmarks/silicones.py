@@ -1,8 +1,7 @@
-"""What real silicones change: unit cells of Yeoh laws fitted to tensile tests against neo-Hookean ones of the
-same initial modulus.
+"""How well the law knows real silicones: unit cells of Yeoh laws fitted to tensile tests, computed on the
+coarse grid of the campaign, against the law, which learned from made-up ones.
 
-The trained law knows the neo-Hookean material alone; for any other it takes the initial modulus. Both sides
-are finite elements on one mesh, so that the material is all that differs.
+What finer grids change is added to the cells as the law has learned it, so that both are of the same body.
 """
 
 import tempfile
@@ -13,42 +12,51 @@ import numpy as np
 
 from benchmarks.tables import table
 
-#: of the table: the softest, a middle one, and the one that stiffens most of five tried
-SILICONES = ("Ecoflex 00-30", "Mold Star 16 FAST", "Dragon Skin 10 MEDIUM")
+ROOT = Path(__file__).resolve().parent.parent
+CAMPAIGN = ROOT / "examples" / "campaigns" / "cells-v2.toml"
+#: of the table: the softest, a middle one, the two that stiffen most, and one with a third constant
+SILICONES = ("Ecoflex 00-30", "Mold Star 16 FAST", "Dragon Skin 10 MEDIUM", "WAGNERSIL 20 NF", "RTV615")
 DESIGNS = (("one_sided_w10", 60.0), ("one_sided_w10", 90.0), ("twist_w12", 60.0))
-MESH_SIZE = 2.0
 LEVELS = (0.05, 0.1, 0.15, 0.2)  # P/mu
 
 
-def free_strains(segment):
-    """(levels, 6) free strains (e, k normal pitch) of FE at LEVELS."""
+def free_strains(segment, grid):
+    """(levels, 6) free strains (e, k normal pitch) of FE at LEVELS on a Mesh of hifi.runs.campaign.file."""
+    from pneunet.geometry.cad.grid import grid_cell
     from pneunet.geometry.shape_numbers import normal_pitch
     from pneunet.hifi.cell.file import CellCase
-    from pneunet.hifi.cell.run import solve_cell
+    from pneunet.hifi.cell.problem import CellProblem
+    from pneunet.hifi.cell.run import follow_path
+    from pneunet.hifi.contact.penalty import WallPenalty
+    from pneunet.hifi.runs.campaign.sample import typical
 
-    states = []
+    states, like = [], typical(segment.kind)
+    case = CellCase(segment, LEVELS[-1] * segment.material.mu, grid.mesh_size, len(LEVELS))
     with tempfile.TemporaryDirectory() as folder:
-        solve_cell(
-            CellCase(segment, LEVELS[-1] * segment.material.mu, MESH_SIZE, len(LEVELS)),
-            Path(folder) / "cell.npz",
-            states.append,
-        )
+        path = Path(folder) / "cell.npz"
+        grid_cell(segment, grid.mesh_size, path, grid.edge_size, like=like)
+        follow_path(case, CellProblem(segment, path, contact=WallPenalty()), states.append)
     scale, loaded = normal_pitch(segment), [s for s in states if s.pressure > 0]
     return np.array([[*s.strains.e, *(s.strains.k * scale)] for s in loaded])
 
 
 def silicones():
     """The part `silicones`."""
-    from pneunet.base.materials.laws import NeoHookean, silicone
+    from pneunet.base.materials.laws import silicone
     from pneunet.geometry.reference_cases import CASES
+    from pneunet.geometry.shape_numbers import numbers_of
+    from pneunet.hifi.runs.campaign.file import read_campaign
+    from pneunet.reduced import read_law
+    from pneunet.reduced.choice import SHIPPED
 
-    rows = []
+    rows, laws, grid = [], read_law(SHIPPED).kinds, read_campaign(CAMPAIGN).meshes[0]
     for name, angle in DESIGNS:
-        segment = CASES[name](angle, 1)
-        plain = free_strains(replace(segment, material=NeoHookean(mu=0.1)))
         for material in map(silicone, SILICONES):
-            real = free_strains(replace(segment, material=material))
-            error = np.linalg.norm(real - plain, axis=1) / np.linalg.norm(plain - np.eye(6)[0], axis=1)
+            segment = replace(CASES[name](angle, 1), material=material)
+            law, numbers = laws[segment.kind], np.repeat(numbers_of([segment])[0], len(LEVELS), axis=0)
+            pressure, real = law.mesh.converged(numbers, np.array(LEVELS), free_strains(segment, grid))
+            missed = law.free_strains(numbers, pressure) - real
+            error = np.linalg.norm(missed, axis=1) / np.linalg.norm(real - np.eye(6)[0], axis=1)
             rows.append(
                 {"design": f"{name}, {angle:g} deg", "silicone": material.name, "error": error.tolist()}
             )
@@ -58,11 +66,7 @@ def silicones():
         "law_real_silicone_strain_rel_01": worst[LEVELS.index(0.1)],
         "law_real_silicone_strain_rel_02": worst[LEVELS.index(0.2)],
     }
-    return {key: float(value) for key, value in figures.items()}, {
-        "mesh_size_mm": MESH_SIZE,
-        "levels": LEVELS,
-        "rows": rows,
-    }
+    return {key: float(value) for key, value in figures.items()}, {"levels": LEVELS, "rows": rows}
 
 
 def table_of_silicones():
@@ -78,10 +82,10 @@ def lines(details):
     head = ["design", "silicone", *[f"P/mu = {p:g}" for p in details["levels"]]]
     rows = [(r["design"], r["silicone"], *[f"{e:.1%}" for e in r["error"]]) for r in details["rows"]]
     text = (
-        "The law takes the initial modulus of a material. The table has what that costs: free strains of unit"
-        " cells of real silicones (Yeoh laws fitted to tensile tests of the Soft Robotics Materials Database,"
-        " Marechal et al. 2021, ODbL) against neo-Hookean cells of the same initial modulus. It is the norm"
-        " of the difference of (e, k l) over the norm of the free strains, finite elements on both sides,"
-        f" h = {details['mesh_size_mm']:g} mm."
+        "The law knows a silicone by its initial modulus and by how it stiffens. The table has how far it is"
+        " off for real ones (Yeoh laws fitted to tensile tests of the Soft Robotics Materials Database,"
+        " Marechal et al. 2021, ODbL): the norm of the difference of (e, k l) from that of unit cells over"
+        " the norm of the free strains. The cells are computed on the coarse grid of the data set; what"
+        " finer grids change is added as the law has learned it."
     )
     return ["## Other materials", "", text, "", *table(head, rows), ""]

@@ -12,8 +12,6 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
@@ -105,7 +103,7 @@ def suggest(
 
     InputError where the campaign or the law does not know the kind.
     """
-    from pneunet.geometry.shape_numbers import shape_numbers
+    from pneunet.geometry.shape_numbers import numbers_of
     from pneunet.hifi.runs.campaign.file import on_offer, read_campaign
     from pneunet.reduced.training.suggestion import most_telling
 
@@ -115,7 +113,7 @@ def suggest(
         raise InputError(f"--kind {kind}: {who} does not know it")
     offered = on_offer(campaign, kind, of)
     log.info(f"# {number} of {len(offered)} designs are chosen one after the other")
-    shape = np.array([shape_numbers(segment) for _, segment in offered])
+    numbers, _ = numbers_of([segment for _, segment in offered])
     top, share = (campaign.table[key] for key in ("top_pressure", "limit_share"))
-    rows = most_telling(known[kind], shape, number, top, share, touching)
+    rows = most_telling(known[kind], numbers, number, top, share, touching)
     return sorted(offered[row][0] for row in rows)

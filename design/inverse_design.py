@@ -291,11 +291,9 @@ def answer(design: Design) -> Iterator[str]:
     if spread.law_rms is None or spread.law_tip is None:
         yield f"how far the real body may be: the law '{design.law.name}' does not know"
     else:
-        rms, tip = np.hypot(spread.law_rms, spread.mesh_rms), np.hypot(spread.law_tip, spread.mesh_tip)
         yield (
-            f"the real body may be {rms:.1f} mm RMS and {tip:.1f} mm at the tip from this prediction:"
-            f" at the tip {spread.law_tip:.1f} mm (90 % of cases) for the law and {spread.mesh_tip:.1f} mm"
-            " for the mesh of its cells, which is a little too stiff"
+            f"the real body may be {spread.law_rms:.1f} mm RMS and {spread.law_tip:.1f} mm at the tip from"
+            " this prediction (90 % of cases)"
         )
     silicone, casting = f"{target.material.name}, mu = {target.material.mu:.4g} MPa", target.casting
     if casting.silicones:

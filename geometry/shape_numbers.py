@@ -8,6 +8,7 @@ from operator import attrgetter
 import numpy as np
 
 from pneunet.base.materials.laws import Hyperelastic
+from pneunet.base.materials.stiffening import stiffening
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
 
 #: Segment's attributes in order: the angle in degrees, then lengths
@@ -20,6 +21,8 @@ _dimensions = attrgetter(*SHAPE)
 PITCH_BY = np.array([{"cavity_thickness": 1.0, "wall": 2.0, "gap": 1.0}.get(name, 0.0) for name in SHAPE])
 #: how a material stiffens, after SHAPE among a cell's numbers: of Yeoh's law
 STIFFENING = ("c20/c10", "c30/c10")
+#: what strains times a length depend on, besides the pressure over the initial shear modulus
+NUMBERS = (*SHAPE, *STIFFENING)
 #: kind -> name -> changes of SHAPE by one: the directions in which shapes differ when the normal pitch is
 #: the unit of length. Walls and cavities grow at the gap's cost; what a campaign ties together
 #: (hifi.runs.campaign.sample) moves together
@@ -49,9 +52,9 @@ DIRECTIONS = {
 
 
 def direction_matrix(kind: str) -> np.ndarray:
-    """(directions, 15) changes of SHAPE and STIFFENING: along DIRECTIONS, then one of STIFFENING each."""
+    """(directions, 15) changes of NUMBERS: along DIRECTIONS, then one of STIFFENING each."""
     changes = [*DIRECTIONS[kind].values(), *({name: 1.0} for name in STIFFENING)]
-    return np.array([[change.get(name, 0.0) for name in (*SHAPE, *STIFFENING)] for change in changes])
+    return np.array([[change.get(name, 0.0) for name in NUMBERS] for change in changes])
 
 
 def changed(segment: Segment, change: Mapping[str, float], step: float) -> Segment:
@@ -70,14 +73,16 @@ def normal_pitch(segment: Segment) -> float:
 
 def shape_numbers(segment: Segment) -> np.ndarray:
     """(13,) the angle in degrees and the lengths of SHAPE in normal pitches."""
-    return shapes_of([segment])[0][0]
+    return numbers_of([segment])[0][0, : len(SHAPE)]
 
 
-def shapes_of(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
-    """(`shape_numbers` (n, 13), `normal_pitch` (n,) in mm) of n segments."""
-    shape, pitch = np.array([_dimensions(s) for s in segments]), np.array([normal_pitch(s) for s in segments])
-    shape[:, 1:] /= pitch[:, None]
-    return shape, pitch
+def numbers_of(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
+    """(NUMBERS (n, 15), `normal_pitch` (n,) in mm) of n segments, with their materials' stiffening
+    (base.materials.stiffening)."""
+    numbers = np.array([(*_dimensions(s), *stiffening(s.material)[:2]) for s in segments])
+    pitch = np.array([normal_pitch(s) for s in segments])
+    numbers[:, 1 : len(SHAPE)] /= pitch[:, None]
+    return numbers, pitch
 
 
 def by_dimensions(slopes: np.ndarray, shape: np.ndarray, pitch: np.ndarray) -> np.ndarray:

@@ -117,7 +117,7 @@ def test_the_wheel_holds_the_packages_with_their_data_and_nothing_else(wheels):
     for wheel in wheels:
         names = set(zipfile.ZipFile(wheel).namelist())
         assert {name for name in names if ".dist-info/" not in name} == expected
-    for data in ("py.typed", "design/data/octopus.toml", "reduced/data/rod-law-v1.npz"):
+    for data in ("py.typed", "design/data/octopus.toml", "reduced/data/rod-law-v2.npz"):
         assert f"pneunet/{data}" in expected
     assert any(name.startswith("pneunet/hifi/verification/data/") for name in expected)
 

@@ -11,7 +11,6 @@ from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.design.measured.registration import line_of, register, turned_about
 from pneunet.design.measured.table import ANGLE, CENTRELINE, DISPLACEMENT, MARKERS, STATIONS, Measurement
-from pneunet.design.search.tolerances import MESH
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
@@ -140,12 +139,12 @@ class Predicted:
     @cached_property
     def moves(self) -> np.ndarray:
         """(e, n, k, d): what each error that the law admits does to what is observed, at half of its 90 %
-        interval: of every strain of every segment, independent of the others, and of the mesh of its cells;
-        (0, ...) where the law knows none."""
+        interval: of every strain of every segment, independent of the others; (0, ...) where the law knows
+        none."""
         segments, n = self.design.manipulator.segments, len(self.measured.pressures)
         per_level = [self._scaled(p) for p in self.measured.pressures.tolist()]
         pressures = np.array([self.design.manipulator.pressures(p) for p in per_level])
-        kinds, mesh = [], np.zeros((n, len(segments), 6))
+        kinds = []
         for i, segment in enumerate(segments):
             if segment.kind == PASSIVE:
                 continue
@@ -156,9 +155,7 @@ class Predicted:
                 shift = np.zeros((n, len(segments), 6))
                 shift[:, i, j] = [half[j] for half in halves if half is not None]
                 kinds.append(shift)
-            strains = self.law.strains(segment, pressures[:, i]).vector
-            mesh[:, i] = MESH.get(segment.kind, 0.0) * (strains - np.eye(6)[0])
-        found = [self.observed(self.lines(shifts=shift)) - self.plain for shift in (*kinds, mesh)]
+        found = [self.observed(self.lines(shifts=shift)) - self.plain for shift in kinds]
         return np.array(found)
 
     @property

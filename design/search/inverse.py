@@ -204,7 +204,7 @@ class _Search:
             through = "; the design so far runs through itself" if self.best.overlaps > best.overlaps else ""
             log.info(f"another candidate wins:  {best}{through}")
         segments, pressures = best.manipulator.segments, best.at.body.pressures.max(axis=0)
-        of_walls = list(at_limits(segments, pressures, self.target.casting.allow_touch))
+        of_walls = list(at_limits(segments, pressures, self.law, self.target.casting.allow_touch))
         stopping = [text for saved, text in bounds if saved > 0] + of_walls
         return Found(
             best,

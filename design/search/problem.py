@@ -15,7 +15,7 @@ from pneunet.design.search.aims import Aim
 from pneunet.design.search.space import Variable
 from pneunet.design.target.extraction import Extracted
 from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
-from pneunet.reduced.analytic.clearance import gap_left_and_slopes, wall_strain_and_slopes
+from pneunet.reduced.rod.clearance import allowed_stretch
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.loaded_slopes import loaded
 from pneunet.reduced.rod.piece_slopes import (
@@ -28,7 +28,7 @@ from pneunet.reduced.rod.piece_slopes import (
     strain_slopes,
 )
 from pneunet.reduced.rod.placing import PlacedRod, Stations
-from pneunet.reduced.rod.states import StatesWithSlopes
+from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
 
 #: mm of misfit per mm that facing walls would overlap: contact is not designed into
 TOUCH = 5.0
@@ -162,7 +162,7 @@ class Problem:
         misfit = sum(float(r @ r) for r, _ in parts) / len(parts)
         parts = [(r / np.sqrt(len(shapes)), J / np.sqrt(len(shapes))) for r, J in parts]
         parts += [self._doubts(i, shape) for i, shape in enumerate(shapes)]
-        parts += [self._unseen_twists(body, shapes[0]), self._walls(body), self._preferences(x)]
+        parts += [self._unseen_twists(body, shapes[0]), self._walls(body, shapes), self._preferences(x)]
         residual, jacobian = np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
         return Evaluation(body, shapes, residual, jacobian, misfit)
 
@@ -232,13 +232,15 @@ class Problem:
                 slopes.append(self.columns(by, 0))
         return np.array(rows), np.array(slopes).reshape(len(rows), len(self.x))
 
-    def _walls(self, body):
+    def _walls(self, body, shapes):
         """TOUCH times by how much facing walls of each segment are expected to pass through each other, and
         TEAR times by how much they are expected to stretch too far."""
         rows, slopes = [], []
-        for number, pressures in enumerate(body.pressures):
-            for i, (segment, pressure) in enumerate(zip(body.segments, pressures)):
-                for value, by_value in () if segment.kind == PASSIVE else self._beyond(segment, pressure):
+        for number, shape in enumerate(shapes):
+            for i, segment in enumerate(body.segments):
+                for value, by_value in (
+                    () if segment.kind == PASSIVE else self._beyond(segment, i, shape.states)
+                ):
                     if value > 0:
                         by = np.zeros((len(body.segments), len(FIELDS)))
                         by[i, OF_LAWS] = by_value
@@ -246,14 +248,17 @@ class Problem:
                         slopes.append(self.columns(by, number))
         return np.array(rows), np.array(slopes).reshape(len(rows), len(self.x))
 
-    def _beyond(self, segment, pressure):
-        """Yields (mm of misfit where positive, its derivatives) of each limit of a segment's walls."""
+    def _beyond(self, segment, i, states):
+        """Yields (mm of misfit where positive, its derivatives) of each limit of the i-th segment's walls."""
         if not self.may_touch:
-            left, by_left = gap_left_and_slopes(segment, pressure)
-            yield -TOUCH * left, -TOUCH * by_left
-        if np.isfinite(segment.material.elongation_at_break):
-            strain, by_strain = wall_strain_and_slopes(segment, pressure)
-            yield TEAR * (strain - NEARLY), TEAR * by_strain
+            overlap = states.closed[i] - 1
+            by = segment.gap * states.closed_by[i]
+            by[VARIABLES.index("gap")] += overlap
+            yield TOUCH * segment.gap * overlap, TOUCH * by
+        allowed = allowed_stretch(segment) - 1
+        if np.isfinite(allowed):
+            strain = (states.stretch[i] - 1) / allowed
+            yield TEAR * (strain - NEARLY), TEAR / allowed * states.stretch_by[i]
 
     def _preferences(self, x):
         drawn = [(j, v.start, PREFERENCE / v.scale) for j, v in enumerate(self.variables) if v.start]

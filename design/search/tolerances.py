@@ -9,7 +9,7 @@ import numpy as np
 from pneunet.base.units import MPA_PER_KPA
 from pneunet.design.search.problem import Body, Shape
 from pneunet.design.target.casting import Casting
-from pneunet.geometry.parameters import ONE_SIDED, PASSIVE, TWISTING, Segment
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
 from pneunet.geometry.shape_numbers import SHAPE
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.piece_slopes import FIELD_AT
@@ -18,9 +18,6 @@ from pneunet.reduced.rod.piece_slopes import FIELD_AT
 PER_LENGTH, PER_ANGLE, PER_PRESSURE, PER_MODULUS = 0.1, 1.0, 1.0, 0.01
 #: dimensions that a casting misses, by file key without its unit
 LENGTHS = (*SHAPE[1:], "end_margin", "plain_length")
-#: kind -> share by which the strains of cells on the law's finest mesh, 1 mm, are less than those of ever
-#: finer ones (measured: docs/use-design.md)
-MESH = {ONE_SIDED: 0.05, TWISTING: 0.02}
 
 
 @dataclass(frozen=True)
@@ -44,23 +41,19 @@ class Effect:
 class Tolerances:
     """effects: of each dimension, pressure and modulus alone. rms, tip: root mean square and tip deviation
     (mm) to be expected of castings with the stated tolerances, all independent. law_rms, law_tip: half of the
-    90 % interval of the law's own error, None where it knows none; mesh_rms, mesh_tip: what the mesh of its
-    cells costs."""
+    90 % interval of the law, None where it knows none."""
 
     effects: tuple[Effect, ...]
     rms: float
     tip: float
     law_rms: float | None
     law_tip: float | None
-    mesh_rms: float
-    mesh_tip: float
 
     def table(self) -> dict:
         """By file key."""
         out: dict = {"casting_rms_mm": self.rms, "casting_tip_mm": self.tip}
         if self.law_rms is not None and self.law_tip is not None:
             out |= {"law_90_percent_rms_mm": self.law_rms, "law_90_percent_tip_mm": self.law_tip}
-            out |= {"mesh_rms_mm": self.mesh_rms, "mesh_tip_mm": self.mesh_tip}
         out = {key: round(float(value), 4) for key, value in out.items()}
         rows = [
             {"name": e.name, "change": e.change, "rms_mm": round(e.rms, 4), "tip_mm": round(e.tip, 4)}
@@ -115,21 +108,17 @@ def _sizes(moves):
 
 def _of_the_law(body, shape, law):
     """(RMS, tip) in mm of the law, half of 90 % intervals, each strain's error independent of the others', or
-    None; (RMS, tip) of the mesh, whose error is the same everywhere."""
-    squares, by_strains = np.zeros(2), shape.strain_moves
-    share = np.array([MESH.get(s.kind, 0.0) for s in body.segments])
-    of_mesh = _sizes(
-        np.einsum("sxnj,nj->sx", by_strains, share[:, None] * (shape.states.strains - np.eye(6)[0]))
-    )
+    None."""
+    squares = np.zeros(2)
     for i, segment in enumerate(body.segments):
         if segment.kind == PASSIVE:
             continue
         half = law.half_width(segment, float(body.pressures[0, i]))
         if half is None:
-            return None, None, *map(float, of_mesh)
+            return None, None
         for j in range(6):
-            squares += np.square(_sizes(half[j] * by_strains[:, :, i, j]))
-    return tuple(float(a) for a in (*np.sqrt(squares), *of_mesh))
+            squares += np.square(_sizes(half[j] * shape.strain_moves[:, :, i, j]))
+    return tuple(np.sqrt(squares).tolist())
 
 
 def largest(effects: Sequence[Effect], count: int) -> list[Effect]:

@@ -11,7 +11,7 @@ from pneunet.base.units import MPA_PER_KPA
 from pneunet.design.report.rundata import Solution
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Segment
-from pneunet.reduced.analytic.clearance import allowed_stretch, gap_left, wall_stretch
+from pneunet.reduced.rod.clearance import allowed_stretch
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.prediction import doubts, predict
 
@@ -30,21 +30,21 @@ class Limit:
 def limits(design: DesignFile, law: SegmentLaw, solved: Solution | None = None) -> list[Limit]:
     """What limits the pressure, the lowest first; finite elements know better than estimates where there are
     any."""
-    found = [*_touch(design, solved), *_break(design, solved), *_limit_point(design, law, solved)]
+    found = [*_touch(design, law, solved), *_break(design, law, solved), *_limit_point(design, law, solved)]
     return sorted(found, key=lambda limit: limit.pressure)
 
 
-def _touch(design, solved):
+def _touch(design, law, solved):
     told = None if solved is None else solved.record.get("first_touch_kPa")
     if told is not None:
         yield Limit(told * MPA_PER_KPA, "walls of neighbouring chambers touch (finite elements)")
         return
-    pressure, i = _first(design, gap_left, solved)
+    pressure, i = _first(design, lambda s, p: 1 - law.walls(s, p)[0], solved)
     if i is not None:
-        yield Limit(pressure, f"walls of segment {i} touch (estimate by plates, which is early by a quarter)")
+        yield Limit(pressure, f"walls of segment {i} touch ({law.of_walls})")
 
 
-def _break(design, solved):
+def _break(design, law, solved):
     most = min(allowed_stretch(s) for s in design.manipulator.segments)
     if solved is not None and np.isfinite(most):
         steps = solved.steps
@@ -53,13 +53,13 @@ def _break(design, solved):
             pressure = steps["pressure_kPa"][over[0]] * MPA_PER_KPA
             yield Limit(pressure, f"stretch {most:.2f}, half of the elongation at break (finite elements)")
             return
-    pressure, i = _first(design, lambda s, p: allowed_stretch(s) - wall_stretch(s, p), solved)
+    pressure, i = _first(design, lambda s, p: allowed_stretch(s) - law.walls(s, p)[1], solved)
     if i is not None:
         most = allowed_stretch(design.manipulator.segments[i - 1])
         yield Limit(
             pressure,
-            f"walls of segment {i} come to stretch {most:.2f}, half of the elongation at break (estimate by"
-            " plates)",
+            f"walls of segment {i} come to stretch {most:.2f}, half of the elongation at break"
+            f" ({law.of_walls})",
         )
 
 

@@ -25,7 +25,7 @@ from pneunet.hifi.cell.system import CellSystem
 STEP, ANGLE_STEP, MATERIAL_STEP = 1e-4, 1e-2, 1e-3
 
 
-class Slopes:
+class StateSlopes:
     """For a hifi.cell.problem.CellProblem, which must be where its segment is. Derivatives by the stiffening
     are for Yeoh's law, zero for others."""
 

@@ -18,6 +18,7 @@ from pneunet.base.strains import RodStrains
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.parameters import Segment
 from pneunet.geometry.shape_numbers import SHAPE
+from pneunet.reduced.rod.clearance import wall_bulge, wall_stretch
 from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
 
 #: degrees and mm, and of the pressure: of laws without slopes of their own
@@ -93,9 +94,11 @@ class TurnedSection:
 
 class SegmentLaw(ABC):
     """What predicts the free strains of the middle of a long segment with chambers, in the segment's own axes
-    whatever its roll (reduced.rod.ends turns them); `name`: what --law calls it."""
+    whatever its roll (reduced.rod.ends turns them); `name`: what --law calls it; `of_walls`:
+    where it knows `walls` from, in words."""
 
     name: str
+    of_walls = "estimate by plates, which is early by a quarter"
 
     @abstractmethod
     def of(self, segment: Segment) -> SectionLaw:
@@ -130,7 +133,7 @@ class SegmentLaw(ABC):
     def each_with_slopes(
         self, segments: Sequence[Segment], pressure: float | ArrayLike, names: Collection[str] = SHAPE
     ) -> StatesWithSlopes:
-        """StatesWithSlopes of n segments at a pressure in MPa, one for all or (n,), of the strains alone; by
+        """StatesWithSlopes of n segments at a pressure in MPa, one for all or (n,), walls as plates; by
         central differences, and only by those of SHAPE that are among `names`, the others 0."""
         pressures = np.broadcast_to(np.asarray(pressure, float), len(segments))
         slopes = np.zeros((len(segments), 6, len(VARIABLES)))
@@ -142,7 +145,7 @@ class SegmentLaw(ABC):
             low, high = (self.strains(segment, P + d).vector for d in (-step, step))
             by[:, -2] = (high - low) / (2 * step)
             by[:, -1] = -P / segment.material.mu * by[:, -2]
-        return StatesWithSlopes.of_strains(self.each(segments, pressures).vector, slopes)
+        return StatesWithSlopes.of_strains(self.each(segments, pressures).vector, slopes, segments, pressures)
 
     def _slope(self, segment, pressure, name):
         """(6,) derivative by one of SHAPE; 0 where the segment cannot be changed in it, one-sided where only
@@ -155,6 +158,11 @@ class SegmentLaw(ABC):
                 found.append((0.0, self.strains(segment, pressure).vector))
         (low, before), (high, after) = found
         return (after - before) / (high - low) if high > low else np.zeros(6)
+
+    def walls(self, segment: Segment, pressure: float) -> tuple[float, float]:
+        """(part of the gap that facing walls of a segment have closed at a pressure in MPa, they touch from 1
+        on; how far the silicone is stretched)."""
+        return 2 * wall_bulge(segment, pressure) / segment.gap, wall_stretch(segment, pressure)
 
     def excess(self, segment: Segment, pressure: float) -> np.ndarray:
         """How far (0: not at all) the segment lies outside what the law knows, (d,) in widths of that."""

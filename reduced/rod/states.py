@@ -1,12 +1,14 @@
 """What a law says of segments, with derivatives by what a designer changes: an optimiser's one call."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pneunet.base.strains import RodStrains
+from pneunet.geometry.parameters import Segment
 from pneunet.geometry.shape_numbers import PITCH_BY, SHAPE, by_dimensions
+from pneunet.reduced.rod.clearance import closed_and_slopes, wall_stretch_and_slopes
 
 #: by which derivatives are taken, in the order of their last axis: Segment's dimensions (degrees, mm), the
 #: pressure and the initial shear modulus (MPa)
@@ -22,7 +24,8 @@ class StatesWithSlopes:
     strains (n, 6): (e, k) of the free state, 1/mm for k. excess (n, r): how far each lies outside what the
     law knows, 0 inside, KindLaw.excess with zeros at the end of a kind that has fewer: its squares are
     smooth enough to be minimised. closed (n,): part of the gap that facing walls have closed, they touch from
-    1 on. strains_by (n, 6, 15), excess_by (n, r, 15), closed_by (n, 15).
+    1 on; stretch (n,): the silicone's largest. strains_by (n, 6, 15), excess_by (n, r, 15), closed_by,
+    stretch_by (n, 15).
     """
 
     strains: np.ndarray
@@ -31,13 +34,31 @@ class StatesWithSlopes:
     excess_by: np.ndarray
     closed: np.ndarray
     closed_by: np.ndarray
+    stretch: np.ndarray
+    stretch_by: np.ndarray
 
     @classmethod
-    def of_strains(cls, strains: np.ndarray, strains_by: np.ndarray) -> "StatesWithSlopes":
-        """Of a law that knows neither doubt nor walls."""
+    def of_strains(
+        cls, strains: np.ndarray, strains_by: np.ndarray, segments: Sequence[Segment], pressures: np.ndarray
+    ) -> "StatesWithSlopes":
+        """Of a law that knows neither doubt nor walls: those are estimated as plates."""
         n, by = len(strains), strains_by.shape[2]
-        none = np.zeros((n, 0)), np.zeros((n, 0, by)), np.zeros(n), np.zeros((n, by))
-        return cls(strains, strains_by, *none)
+        closed, stretch = (
+            _plates(e, segments, pressures) for e in (closed_and_slopes, wall_stretch_and_slopes)
+        )
+        return cls(strains, strains_by, np.zeros((n, 0)), np.zeros((n, 0, by)), *closed, *stretch)
+
+    def with_stretch(self, segments: Sequence[Segment], pressures: np.ndarray) -> "StatesWithSlopes":
+        """With the estimate of plates where the stretch is not known."""
+        unknown = np.isnan(self.stretch)
+        if not unknown.any():
+            return self
+        stretch, by = _plates(wall_stretch_and_slopes, segments, pressures)
+        return replace(
+            self,
+            stretch=np.where(unknown, stretch, self.stretch),
+            stretch_by=np.where(unknown[:, None], by, self.stretch_by),
+        )
 
     @property
     def rod_strains(self) -> RodStrains:
@@ -46,7 +67,7 @@ class StatesWithSlopes:
     @classmethod
     def of(
         cls,
-        found: Sequence[tuple[list[int], tuple[Slopes, Slopes, Slopes]]],
+        found: Sequence[tuple[list[int], tuple[Slopes, Slopes, Slopes, Slopes]]],
         shape: np.ndarray,
         pitch: np.ndarray,
         pressure: np.ndarray,
@@ -54,13 +75,14 @@ class StatesWithSlopes:
     ) -> "StatesWithSlopes":
         """From [(places, KindLaw.with_slopes there)] of segments with shape numbers (n, 13), normal pitches
         (n,), pressures (n,) and moduli (n,)."""
-        n, r = len(shape), max(excess.shape[1] for _, (_, (excess, _), _) in found)
-        values, slopes = np.zeros((n, 7 + r)), np.zeros((n, 7 + r, len(SHAPE) + 1))
-        for rows, ((strains, strains_by), (excess, excess_by), (closed, closed_by)) in found:
-            end = 7 + excess.shape[1]
-            values[rows, :end] = np.concatenate([strains, closed[:, None], excess], axis=1)
-            slopes[rows, :end] = np.concatenate([strains_by, closed_by[:, None], excess_by], axis=1)
-        by = np.empty((n, 7 + r, len(VARIABLES)))
+        n, r = len(shape), max(excess.shape[1] for _, (_, (excess, _), *_) in found)
+        values, slopes = np.zeros((n, 8 + r)), np.zeros((n, 8 + r, len(SHAPE) + 1))
+        for rows, ((strains, strains_by), (excess, excess_by), *others) in found:
+            end = 8 + excess.shape[1]
+            more, more_by = (np.stack(both, axis=1) for both in zip(*others))
+            values[rows, :end] = np.concatenate([strains, more, excess], axis=1)
+            slopes[rows, :end] = np.concatenate([strains_by, more_by, excess_by], axis=1)
+        by = np.empty((n, 8 + r, len(VARIABLES)))
         by[:, :, :-2] = by_dimensions(slopes[:, :, :-1], shape, pitch)
         by[:, :, -2] = slopes[:, :, -1] / mu[:, None]
         by[:, :, -1] = -by[:, :, -2] * (pressure / mu)[:, None]
@@ -68,4 +90,16 @@ class StatesWithSlopes:
         values[:, 3:6] /= pitch[:, None]
         by[:, 3:6] /= pitch[:, None, None]
         by[:, 3:6, :-2] -= (values[:, 3:6] / pitch[:, None])[:, :, None] * PITCH_BY
-        return cls(values[:, :6], by[:, :6], values[:, 7:], by[:, 7:], values[:, 6], by[:, 6])
+        strains, closed, stretch, excess = (
+            (values[:, c], by[:, c]) for c in (slice(6), 6, 7, slice(8, None))
+        )
+        return cls(*strains, *excess, *closed, *stretch)
+
+
+def _plates(estimate, segments, pressures):
+    """(values (n,), derivatives (n, 15)) of one of reduced.rod.clearance's estimates."""
+    found = [estimate(s, P) for s, P in zip(segments, pressures.tolist())]
+    return (
+        np.array([value for value, _ in found]),
+        np.array([slopes for _, slopes in found]).reshape(len(found), len(VARIABLES)),
+    )

@@ -4,7 +4,8 @@ body's symmetries.
 All without dimension (base.files.dataset): pressure P/mu, strains q = (e, k l). With c = cos(angle), mirror
 images have opposite c, and every quantity is even or odd in c: e2, k1 and k3 change sign in the mirror. Odd
 ones are c times an even function, which is learned as a function of c^2 and the logarithms of the lengths:
-what makes a design soft is a product of powers. The free strains are led by the one that never vanishes, the
+what makes a design soft is a product of powers. How the silicone stiffens is
+an input as it is. The free strains are led by the one that never vanishes, the
 curvature k2 of a one-sided, the stretch of a twisting segment; the others are divided by it. The stiffness is
 L D L^T by the blocks that the half turns of the body leave: unit lower triangular L and log D.
 """
@@ -16,7 +17,7 @@ import numpy as np
 
 from pneunet.base.strains import MIRROR, RodStrains
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING
-from pneunet.geometry.shape_numbers import SHAPE
+from pneunet.geometry.shape_numbers import NUMBERS, SHAPE, STIFFENING
 
 REST = RodStrains.unstrained().vector
 #: P/mu below which the response is linear anyway: the logarithm is taken of their sum
@@ -55,10 +56,10 @@ SMALLEST = 1e-3
 TINY, TOUCH_WIDTH = 1e-6, 0.01
 #: of a normal pitch, by which walls would overlap
 SMALL_OVERLAP = 0.01
-#: the gap's place among the shape numbers
+#: the gap's place among the numbers
 GAP = SHAPE.index("gap")
 #: places of the leading strain and the overlap among the path_inputs
-LEAD, OVERLAP = -3, -1
+LEAD, OVERLAP = -2, -1
 #: kind -> (index of the leading strain, of the others that are not zero)
 LEADING = {ONE_SIDED: (4, (0, 1, 3)), TWISTING: (0, (3,))}
 #: kind -> blocks of the stiffness
@@ -67,43 +68,55 @@ BLOCKS = {ONE_SIDED: ((0, 1, 3, 4), (2, 5)), TWISTING: ((0, 3), (1, 4), (2, 5))}
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The transformations for one kind of segment."""
+    """The transformations for one kind of segment. numbers (n, 15): geometry.shape_numbers.NUMBERS, without
+    dimension."""
 
     kind: str
 
-    def inputs(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
-        """(n, d) regression inputs of shape numbers (n, 13), P/mu (n,) and the mesh's level (n,) or a
-        number."""
-        x = np.empty((len(shape), len(LENGTHS[self.kind]) + 3))
-        x[:, 0], x[:, -2], x[:, -1] = cosine(shape) ** 2, np.log(pressure + SMALL_PRESSURE), level
+    @cached_property
+    def of_cell(self) -> int:
+        """How many of the inputs come first that say what the cell is like, whatever its load."""
+        return 1 + len(LENGTHS[self.kind]) + len(STIFFENING)
+
+    @cached_property
+    def stiffening(self) -> slice:
+        """Places of the silicone's stiffening among the inputs."""
+        return slice(1 + len(LENGTHS[self.kind]), self.of_cell)
+
+    def _with(self, numbers, load):
+        x = np.empty((len(numbers), self.of_cell + 1))
+        x[:, 0], x[:, self.stiffening], x[:, -1] = cosine(numbers) ** 2, numbers[:, len(SHAPE) :], load
         # not out=: numpy's logarithm into strided memory differs in the last bit with where that memory
         # happens to lie
-        x[:, 1:-2] = np.log(self._lengths(shape))
+        x[:, 1 : self.stiffening.start] = np.log(self._lengths(numbers))
         return x
 
-    def ranged(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
+    def inputs(self, numbers: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """(n, d) regression inputs of numbers (n, 15) and P/mu (n,)."""
+        return self._with(numbers, np.log(pressure + SMALL_PRESSURE))
+
+    def lead_inputs(self, numbers: np.ndarray, lead: np.ndarray) -> np.ndarray:
+        """(n, d) the same with the leading strain (n,) in the place of the pressure."""
+        return self._with(numbers, np.log(lead + SMALL_STRAIN))
+
+    def ranged(self, numbers: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(n, r) what the training designs' ranges are told of: the inputs, and the logarithms of the lengths
         that those know only in sums."""
-        apart = np.log(np.maximum(shape[:, [SHAPE.index(name) for name in IN_SUMS[self.kind]]], SMALLEST))
-        return np.hstack([self.inputs(shape, pressure, level), apart])
+        apart = np.log(np.maximum(numbers[:, [SHAPE.index(name) for name in IN_SUMS[self.kind]]], SMALLEST))
+        return np.hstack([self.inputs(numbers, pressure), apart])
 
-    def ranged_slopes(self, shape: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+    def ranged_slopes(self, numbers: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(n, r, 14) derivatives of `ranged` by the 13 shape numbers and P/mu."""
-        d, apart = len(LENGTHS[self.kind]) + 3, [SHAPE.index(name) for name in IN_SUMS[self.kind]]
-        by = np.zeros((len(shape), d + len(apart), len(SHAPE) + 1))
-        by[:, :d] = self.by_shape(shape, np.broadcast_to(np.eye(d), (len(shape), d, d)))
-        by[:, d - 2, -1] = 1 / (pressure + SMALL_PRESSURE)
-        by[:, d + np.arange(len(apart)), apart] = 1 / np.maximum(shape[:, apart], SMALLEST)
+        d, apart = self.of_cell + 1, [SHAPE.index(name) for name in IN_SUMS[self.kind]]
+        by = np.zeros((len(numbers), d + len(apart), len(SHAPE) + 1))
+        by[:, :d] = self.by_shape(numbers, np.broadcast_to(np.eye(d), (len(numbers), d, d)))
+        by[:, d - 1, -1] = 1 / (pressure + SMALL_PRESSURE)
+        by[:, d + np.arange(len(apart)), apart] = 1 / np.maximum(numbers[:, apart], SMALLEST)
         return by
 
-    def path_inputs(
-        self, shape: np.ndarray, lead: np.ndarray, level: float | np.ndarray, overlap: np.ndarray
-    ) -> np.ndarray:
-        """(n, d + 1) the same with the leading strain (n,) in the place of the pressure, and `overlap_input`
-        (n,)."""
-        x = self.inputs(shape, np.zeros(len(shape)), level)
-        x[:, -2] = np.log(lead + SMALL_STRAIN)
-        return np.column_stack([x, self.overlap_input(overlap)])
+    def path_inputs(self, numbers: np.ndarray, lead: np.ndarray, overlap: np.ndarray) -> np.ndarray:
+        """(n, d + 1) `lead_inputs` and `overlap_input` (n,)."""
+        return np.column_stack([self.lead_inputs(numbers, lead), self.overlap_input(overlap)])
 
     @staticmethod
     def overlap_input(overlap: np.ndarray) -> np.ndarray:
@@ -127,30 +140,24 @@ class Coordinates:
         first touch is missed by twice as much.)"""
         return lead if self.kind == ONE_SIDED else pressure
 
-    def closing_inputs(self, shape: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """(n, d - 1) regression inputs of how far walls close over the load (n,): the same, whatever the
-        mesh."""
-        return self.with_load(self.inputs(shape, np.zeros(len(shape)), 0), load)
+    def closing_inputs(self, numbers: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """(n, d) regression inputs of how far walls close over the load (n,)."""
+        return self._with(numbers, load)
 
     def with_load(self, inputs: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """(n, d - 1) the same with what `inputs` (n, .) say of the shape."""
-        return np.concatenate([inputs[:, : len(LENGTHS[self.kind]) + 1], load[:, None]], axis=1)
+        """(n, d) the same with what `inputs` (n, .) say of the cell."""
+        return np.concatenate([inputs[:, : self.of_cell], load[:, None]], axis=1)
 
-    def stiffness_inputs(
-        self, shape: np.ndarray, strains: np.ndarray, level: float | np.ndarray
-    ) -> np.ndarray:
+    def stiffness_inputs(self, numbers: np.ndarray, strains: np.ndarray) -> np.ndarray:
         """(n, d) regression inputs of the stiffness: the leading one of the free strains (n, 6) in the place
         of the pressure. (What softens a cell is how far it has gone; measured: a fifth off the error.)"""
-        x = self.inputs(shape, np.zeros(len(shape)), level)
-        x[:, -2] = self.leading(strains)
-        return x
+        return self._with(numbers, self.leading(strains))
 
-    def contact_inputs(self, shape: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> np.ndarray:
-        """(n, d) those of what contact adds to it, the same, whatever the mesh: by how much walls would
-        overlap, having `closed` (n,) so much of their gap, in the mesh's place."""
-        x = self.stiffness_inputs(shape, strains, 0)
-        x[:, -1] = self.overlap_input((closed - 1) * shape[:, GAP])
-        return x
+    def contact_inputs(self, numbers: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> np.ndarray:
+        """(n, d + 1) those of what contact adds to it: by how much walls would overlap, too, having `closed`
+        (n,) so much of their gap."""
+        overlap = self.overlap_input((closed - 1) * numbers[:, GAP])
+        return np.column_stack([self.stiffness_inputs(numbers, strains), overlap])
 
     @staticmethod
     def touch(closed: np.ndarray) -> np.ndarray:
@@ -158,35 +165,36 @@ class Coordinates:
         go on."""
         return 1 / (1 + np.exp(-np.clip(np.log(np.maximum(closed, TINY)) / TOUCH_WIDTH, -30, 30)))
 
-    def around_inputs(self, shape: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> np.ndarray:
-        """(n, d + 1) what the enthalpy around free states depends on: the same, and whether walls touch."""
-        return np.column_stack([self.contact_inputs(shape, strains, closed), self.touch(closed)])
+    def around_inputs(self, numbers: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> np.ndarray:
+        """(n, d + 2) what the enthalpy around free states depends on: the same, and whether walls touch."""
+        return np.column_stack([self.contact_inputs(numbers, strains, closed), self.touch(closed)])
 
     @cached_property
     def _sums(self):
-        """(13, d) from shape numbers to LENGTHS."""
-        out = np.zeros((len(SHAPE), len(LENGTHS[self.kind])))
+        """(15, d) from NUMBERS to LENGTHS."""
+        out = np.zeros((len(NUMBERS), len(LENGTHS[self.kind])))
         for i, parts in enumerate(LENGTHS[self.kind].values()):
             for name, factor in parts.items():
                 out[SHAPE.index(name), i] = factor
         return out
 
-    def _lengths(self, shape):
-        return np.maximum(shape.dot(self._sums), SMALLEST)
+    def _lengths(self, numbers):
+        return np.maximum(numbers.dot(self._sums), SMALLEST)
 
     @property
     def names(self) -> list[str]:
         """What `told` gives."""
         both = LENGTHS[self.kind], IN_SUMS[self.kind]
         lengths, apart = ([f"{name} / normal pitch" for name in names] for names in both)
-        return ["angle_deg (or 180 - that)", *lengths, "pressure / mu", "mesh", *apart]
+        stiffening = [f"{name} of Yeoh's law" for name in STIFFENING]
+        return ["angle_deg (or 180 - that)", *lengths, *stiffening, "pressure / mu", *apart]
 
     def told(self, ranged: np.ndarray) -> np.ndarray:
         """(r,) `ranged` (r,) as a user knows it: degrees, ratios."""
-        ends = [1, *(1 + len(LENGTHS[self.kind]) + np.arange(3))]
-        squared_cosine, lengths, load, level, apart = np.split(ranged, ends)
+        ends = [1, 1 + len(LENGTHS[self.kind]), self.of_cell, self.of_cell + 1]
+        squared_cosine, lengths, stiffening, load, apart = np.split(ranged, ends)
         angle, pressure = np.degrees(np.arccos(np.sqrt(squared_cosine))), np.exp(load) - SMALL_PRESSURE
-        return np.concatenate([angle, np.exp(lengths), np.maximum(pressure, 0), level, np.exp(apart)])
+        return np.concatenate([angle, np.exp(lengths), stiffening, np.maximum(pressure, 0), np.exp(apart)])
 
     # ---- free strains
     @cached_property
@@ -195,18 +203,18 @@ class Coordinates:
         lead, others = LEADING[self.kind]
         return MIRROR[[lead, *others]]
 
-    def learned_strains(self, shape: np.ndarray, pressure: np.ndarray, strains: np.ndarray) -> np.ndarray:
+    def learned_strains(self, numbers: np.ndarray, pressure: np.ndarray, strains: np.ndarray) -> np.ndarray:
         """(n, p) from strains (n, 6) at P > 0: the logarithm of the pressure over the leading one, and the
         others over that."""
         lead, others = LEADING[self.kind]
         q = strains - REST
-        ratios = q[:, others] / q[:, [lead]] / odd(self.strain_parity[1:], cosine(shape))
+        ratios = q[:, others] / q[:, [lead]] / odd(self.strain_parity[1:], cosine(numbers))
         return np.column_stack([np.log(pressure / q[:, lead]), ratios])
 
-    def strains(self, shape: np.ndarray, lead: np.ndarray, ratios: np.ndarray) -> np.ndarray:
+    def strains(self, numbers: np.ndarray, lead: np.ndarray, ratios: np.ndarray) -> np.ndarray:
         """(n, 6) of the leading strain (n,) and the others' learned ratios (n, p - 1)."""
         (of_lead, of_others), lead = self._places, lead[:, None]
-        others = lead * ratios * odd(self.strain_parity[1:], cosine(shape))
+        others = lead * ratios * odd(self.strain_parity[1:], cosine(numbers))
         return REST + lead * of_lead + others @ of_others
 
     @cached_property
@@ -215,18 +223,18 @@ class Coordinates:
         first, others = LEADING[self.kind]
         return np.eye(6)[first], np.eye(6)[list(others)]
 
-    def by_shape(self, shape: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    def by_shape(self, numbers: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """(n, p, 14) derivatives by the 13 shape numbers of what has the derivatives (n, p, .) by inputs,
         those by others than the shape left out; one more, 0, for the pressure."""
         by = np.zeros((*slopes.shape[:2], len(SHAPE) + 1))
         by_lengths = slopes[:, :, 1 : len(LENGTHS[self.kind]) + 1]
-        by[:, :, :-1] = (by_lengths / self._lengths(shape)[:, None]) @ self._sums.T
-        by[:, :, 0] = slopes[:, :, 0] * (2 * cosine(shape) * _by_angle(shape))[:, None]
+        by[:, :, :-1] = (by_lengths / self._lengths(numbers)[:, None]) @ self._sums[: len(SHAPE)].T
+        by[:, :, 0] = slopes[:, :, 0] * (2 * cosine(numbers) * _by_angle(numbers))[:, None]
         return by
 
     def strain_slopes(
         self,
-        shape: np.ndarray,
+        numbers: np.ndarray,
         lead: np.ndarray,
         ratios: np.ndarray,
         by_ratios: np.ndarray,
@@ -235,14 +243,14 @@ class Coordinates:
         """(n, 6, 14) derivatives of `strains` by the shape numbers and P/mu, of those (n, p - 1, 14) of the
         ratios and (n, 14) of the leading strain."""
         first, others = LEADING[self.kind]
-        out, c = np.zeros((len(lead), 6, len(SHAPE) + 1)), cosine(shape)
+        out, c = np.zeros((len(lead), 6, len(SHAPE) + 1)), cosine(numbers)
         out[:, first] = by_lead
         for j, (i, parity) in enumerate(zip(others, self.strain_parity[1:])):
             factor = c if parity < 0 else np.ones(len(lead))
             out[:, i] = (factor * lead)[:, None] * by_ratios[:, j]
             out[:, i] += (factor * ratios[:, j])[:, None] * by_lead
             if parity < 0:
-                out[:, i, 0] += _by_angle(shape) * ratios[:, j] * lead
+                out[:, i, 0] += _by_angle(numbers) * ratios[:, j] * lead
         return out
 
     # ---- stiffness
@@ -264,10 +272,10 @@ class Coordinates:
         at = next(i for i, block in enumerate(blocks) if 4 in block)
         return sum(len(block) * (len(block) + 1) // 2 for block in blocks[:at]) + blocks[at].index(4)
 
-    def learned_stiffness(self, shape: np.ndarray, matrices: np.ndarray) -> np.ndarray:
+    def learned_stiffness(self, numbers: np.ndarray, matrices: np.ndarray) -> np.ndarray:
         """(n, p) from stiffness (n, 6, 6), of which what the symmetries forbid is left out. Not positive
         definite: nan."""
-        c, out = cosine(shape), []
+        c, out = cosine(numbers), []
         for block in BLOCKS[self.kind]:
             K = matrices[:, block][:, :, block]
             good = np.linalg.eigvalsh(K)[:, 0] > 0
@@ -279,9 +287,9 @@ class Coordinates:
             out += [2 * np.log(diagonal), (factor / diagonal[:, None, :])[:, i, j] / odd(parity, c)]
         return np.hstack(out)
 
-    def stiffness(self, shape: np.ndarray, learned: np.ndarray) -> np.ndarray:
+    def stiffness(self, numbers: np.ndarray, learned: np.ndarray) -> np.ndarray:
         """(n, 6, 6), symmetric and positive definite, back from (n, p)."""
-        c, K, start = cosine(shape), np.zeros((len(learned), 6, 6)), 0
+        c, K, start = cosine(numbers), np.zeros((len(learned), 6, 6)), 0
         for block in BLOCKS[self.kind]:
             b = len(block)
             i, j = np.tril_indices(b, -1)
@@ -294,14 +302,14 @@ class Coordinates:
         return K
 
 
-def _by_angle(shape):
+def _by_angle(numbers):
     """(n,) derivative of the cosine by the angle in degrees."""
-    return -np.radians(1.0) * np.sin(np.radians(shape[:, 0]))
+    return -np.radians(1.0) * np.sin(np.radians(numbers[:, 0]))
 
 
-def cosine(shape: np.ndarray) -> np.ndarray:
-    """(n,) cos(angle) of shape numbers (n, 13)."""
-    return np.cos(np.radians(shape[:, 0]))
+def cosine(numbers: np.ndarray) -> np.ndarray:
+    """(n,) cos(angle) of numbers (n, 15)."""
+    return np.cos(np.radians(numbers[:, 0]))
 
 
 def odd(parity: np.ndarray, c: np.ndarray) -> np.ndarray:

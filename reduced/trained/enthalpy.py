@@ -36,6 +36,11 @@ def monomials(kind: str) -> list[tuple[int, ...]]:
     return out
 
 
+def symmetric(K: np.ndarray) -> np.ndarray:
+    """The symmetric parts of matrices (n, 6, 6)."""
+    return (K + np.swapaxes(K, 1, 2)) / 2
+
+
 def whitening(kind: str, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(M (n, 6, 6), D1 (n,)) with v = M d, of stiffnesses (n, 6, 6)."""
     M = np.zeros(K.shape)

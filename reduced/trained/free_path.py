@@ -81,25 +81,24 @@ class FreePath:
         return Unexplained(self.learned.processes[0], self.landmarks)
 
     def at(
-        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray, near: float = NEAR
+        self, numbers: np.ndarray, pressure: np.ndarray, near: float = NEAR
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(leading strain (n,), log P beyond the path's end (n,), 0 up to it, path_inputs (n, d)) at shape
-        numbers (n, 13), P/mu (n,) > 0 and the mesh's level, (n,) or a number. A path ends at its limit load,
-        or where it leaves what is known. near: which steps end the search."""
-        if len(shape) > ROWS:
-            levels, starts = np.broadcast_to(level, len(shape)), range(0, len(shape), ROWS)
-            blocks = [slice(start, start + ROWS) for start in starts]
-            parts = [self.at(shape[b], pressure[b], levels[b], near) for b in blocks]
+        """(leading strain (n,), log P beyond the path's end (n,), 0 up to it, path_inputs (n, d)) at numbers
+        (n, 15) and P/mu (n,) > 0. A path ends at its limit load, or where it leaves what is known. near:
+        which steps end the search."""
+        if len(numbers) > ROWS:
+            blocks = [slice(start, start + ROWS) for start in range(0, len(numbers), ROWS)]
+            parts = [self.at(numbers[b], pressure[b], near) for b in blocks]
             leads, ends, path_inputs = map(np.concatenate, zip(*parts))
             return leads, ends, path_inputs
         co, last = self.coordinates, self._last
-        inputs, wanted = co.inputs(shape, pressure, level), np.log(pressure)
+        inputs, wanted = co.inputs(numbers, pressure), np.log(pressure)
         v = np.minimum(self.start(inputs)[:, 0] + wanted, last)
         everywhere = x = np.concatenate([inputs, v[:, None]], axis=1)
         found, overlap, beyond, searched = np.empty(len(v)), np.empty(len(v)), np.zeros(len(v)), slice(None)
         for _ in range(MOST):
             lead = np.exp(v)
-            over, over_slope, over_curvature = self.closing.along(x, shape, pressure, lead)
+            over, over_slope, over_curvature = self.closing.along(x, numbers, pressure, lead)
             x[:, LEAD], x[:, OVERLAP] = np.log(lead + SMALL_STRAIN), co.overlap_input(over)
             value, slopes, curvatures = self._along.at(x)
             # derivatives by v = log(leading strain): of one input, of log P along it, and, where walls touch,
@@ -127,29 +126,25 @@ class FreePath:
             if not far.any():
                 break
             searched = np.arange(len(found))[searched][far]
-            x, v, wanted, shape, pressure = (a[far] for a in (x, v, wanted, shape, pressure))
+            x, v, wanted, numbers, pressure = (a[far] for a in (x, v, wanted, numbers, pressure))
         lead = np.exp(found)
         everywhere[:, LEAD], everywhere[:, OVERLAP] = np.log(lead + SMALL_STRAIN), co.overlap_input(overlap)
         return lead, beyond * (beyond > ABOVE), everywhere
 
-    def strains_and_end(
-        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def strains_and_end(self, numbers: np.ndarray, pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(free strains (n, 6), log P beyond the path's end (n,))."""
-        lead, beyond, x = self.at(shape, pressure, level)
-        return self.coordinates.strains(shape, lead, self.learned.rest(x)), beyond
+        lead, beyond, x = self.at(numbers, pressure)
+        return self.coordinates.strains(numbers, lead, self.learned.rest(x)), beyond
 
-    def strains(self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray) -> np.ndarray:
+    def strains(self, numbers: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(n, 6) free strains."""
-        return self.strains_and_end(shape, pressure, level)[0]
+        return self.strains_and_end(numbers, pressure)[0]
 
-    def state_and_slopes(
-        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray, near: float = NEAR
-    ) -> StateOnPath:
-        """The StateOnPath of shape numbers (n, 13) at P/mu (n,) > 0; the rest as for `at`."""
-        co, (lead, beyond, x) = self.coordinates, self.at(shape, pressure, level, near)
-        overlap, overlap_by, overlap_by_lead = self.closing.overlap_and_slopes(shape, pressure, lead)
-        chain = PathChain(co, shape, lead, overlap, overlap_by, overlap_by_lead)
+    def state_and_slopes(self, numbers: np.ndarray, pressure: np.ndarray, near: float = NEAR) -> StateOnPath:
+        """The StateOnPath of numbers (n, 15) at P/mu (n,) > 0; the rest as for `at`."""
+        co, (lead, beyond, x) = self.coordinates, self.at(numbers, pressure, near)
+        overlap, overlap_by, overlap_by_lead = self.closing.overlap_and_slopes(numbers, pressure, lead)
+        chain = PathChain(co, numbers, lead, overlap, overlap_by, overlap_by_lead)
         learned, slopes = self.learned.with_slopes(x)
         by, by_lead = chain.at_lead(slopes), chain.by_lead(slopes)
         steep = np.maximum(1 + by_lead[:, 0] * lead, FLAT)
@@ -157,29 +152,27 @@ class FreePath:
         missing_by[:, -1] += 1 / pressure
         return StateOnPath(chain, x, learned, by, by_lead, steep, beyond, missing_by)
 
-    def strains_and_slopes(
-        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def strains_and_slopes(self, numbers: np.ndarray, pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(strains (n, 6), slopes (n, 6, 14)): derivatives by the 13 shape numbers (the angle in degrees) and
         P/mu."""
-        return self.state_and_slopes(shape, pressure, level).strains_and_slopes()
+        return self.state_and_slopes(numbers, pressure).strains_and_slopes()
 
-    def spread(
-        self, shape: np.ndarray, pressure: np.ndarray, level: float | np.ndarray, exact: bool = False
-    ) -> np.ndarray:
-        """(n, 6) standard deviation of the free strains as the Gaussian processes see it, taken as
+    def strains_and_spread(
+        self, numbers: np.ndarray, pressure: np.ndarray, exact: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(free strains (n, 6), their standard deviation (n, 6)) as the Gaussian processes see it, taken as
         independent; from the inducing points alone and the remainder (measured: in the shipped law's range 90
         % lie within 2 % of it), or exact, which takes some ten seconds once."""
-        state = self.state_and_slopes(shape, pressure, level)
+        state = self.state_and_slopes(numbers, pressure)
         x, lead, ratios, by_lead = state.inputs, state.chain.lead, state.learned[:, 1:], state.by_lead
         deviation = self.learned.deviation(x) if exact else self._deviations(x)
         of_lead, (first, others) = lead * deviation[:, 0] / state.steep, LEADING[self.kind]
         out = np.zeros((len(lead), 6))
         out[:, first] = of_lead
         with_lead = ratios + by_lead[:, 1:] * lead[:, None]
-        c = np.abs(odd(self.coordinates.strain_parity[1:], cosine(shape)))
+        c = np.abs(odd(self.coordinates.strain_parity[1:], cosine(numbers)))
         out[:, others] = c * np.hypot(lead[:, None] * deviation[:, 1:], with_lead * of_lead[:, None])
-        return out
+        return self.coordinates.strains(numbers, lead, ratios), out
 
     def _deviation(self, number, left):
         """(n, p) standard deviations of what a learned process says where its inducing points leave this

@@ -27,19 +27,17 @@ class FreeStiffness:
     def coordinates(self) -> Coordinates:
         return Coordinates(self.kind)
 
-    def at(
-        self, shape: np.ndarray, strains: np.ndarray, closed: np.ndarray, level: float | np.ndarray
-    ) -> np.ndarray:
+    def at(self, numbers: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> np.ndarray:
         """(n, 6, 6) of free states with these strains (n, 6) whose walls have closed so much of their gap
-        (n,), on the mesh of a level."""
+        (n,)."""
         co = self.coordinates
-        learned = self.smooth(co.stiffness_inputs(shape, strains, level))
+        learned = self.smooth(co.stiffness_inputs(numbers, strains))
         touch = co.touch(closed)
         some = touch > TINY
         if self.contact and some.any():
-            added = self.contact(co.contact_inputs(shape[some], strains[some], closed[some]))
+            added = self.contact(co.contact_inputs(numbers[some], strains[some], closed[some]))
             learned[np.flatnonzero(some)[:, None], order(co)] += touch[some, None] * added
-        return co.stiffness(shape, learned)
+        return co.stiffness(numbers, learned)
 
 
 def order(coordinates: Coordinates) -> list[int]:

@@ -1,7 +1,8 @@
 """Free states on the path of one kind of cell with their derivatives by shape numbers and P/mu.
 
-What is learned depends on path_inputs: the shape, the leading strain and the overlap of walls, which depends
-on both. The leading strain in turn depends on shape and P/mu, since log P = learned + log(leading strain).
+What is learned depends on path_inputs: the numbers, the leading strain and the overlap of walls, which
+depends on both. The leading strain in turn depends on shape and P/mu, since log P = learned + log(leading
+strain).
 """
 
 from dataclasses import dataclass
@@ -14,13 +15,13 @@ from pneunet.reduced.trained.coordinates import GAP, LEAD, OVERLAP, SMALL_STRAIN
 
 @dataclass(frozen=True)
 class PathChain:
-    """How path_inputs change with the shape numbers (n, 13), P/mu and the leading strain (n,).
+    """How path_inputs change with the numbers (n, 15), P/mu and the leading strain (n,).
 
     overlap (n,): of walls, overlap_by (n, 14): by the shape numbers and P/mu; overlap_by_lead (n,).
     """
 
     coordinates: Coordinates
-    shape: np.ndarray
+    numbers: np.ndarray
     lead: np.ndarray
     overlap: np.ndarray
     overlap_by: np.ndarray
@@ -32,7 +33,7 @@ class PathChain:
     def at_lead(self, slopes: np.ndarray) -> np.ndarray:
         """(n, p, 14) derivatives by the shape numbers and P/mu, at a leading strain, of what has the
         derivatives (n, p, d) by path_inputs."""
-        by = self.coordinates.by_shape(self.shape, slopes)
+        by = self.coordinates.by_shape(self.numbers, slopes)
         return by + self._by_overlap(slopes)[:, :, None] * self.overlap_by[:, None]
 
     def by_lead(self, slopes: np.ndarray) -> np.ndarray:
@@ -66,14 +67,14 @@ class StateOnPath:
 
     def strains_and_slopes(self) -> tuple[np.ndarray, np.ndarray]:
         """(strains (n, 6), their derivatives (n, 6, 14))."""
-        co, shape, lead, ratios = (
+        co, numbers, lead, ratios = (
             self.chain.coordinates,
-            self.chain.shape,
+            self.chain.numbers,
             self.chain.lead,
             self.learned[:, 1:],
         )
         by = self.by[:, 1:] + self.by_lead[:, 1:, None] * self.lead_by[:, None]
-        return co.strains(shape, lead, ratios), co.strain_slopes(shape, lead, ratios, by, self.lead_by)
+        return co.strains(numbers, lead, ratios), co.strain_slopes(numbers, lead, ratios, by, self.lead_by)
 
     def of_inputs(self, slopes: np.ndarray) -> np.ndarray:
         """(n, 14) derivatives of a function of the path_inputs that has the derivatives (n, d) by them."""
@@ -87,7 +88,7 @@ class StateOnPath:
 
     def closed_and_slopes(self) -> tuple[np.ndarray, np.ndarray]:
         """(part of the gap that walls have closed (n,), its derivatives (n, 14))."""
-        chain, gap = self.chain, np.maximum(self.chain.shape[:, GAP], SMALLEST)
+        chain, gap = self.chain, np.maximum(self.chain.numbers[:, GAP], SMALLEST)
         by = (chain.overlap_by + chain.overlap_by_lead[:, None] * self.lead_by) / gap[:, None]
         by[:, GAP] -= chain.overlap / gap**2
         return 1 + chain.overlap / gap, by

@@ -9,7 +9,7 @@ import numpy as np
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.materials.laws import NeoHookean
-from pneunet.geometry.shape_numbers import segment_of
+from pneunet.geometry.shape_numbers import SHAPE, segment_of
 from pneunet.reduced.analytic.law import AnalyticLaw
 from pneunet.reduced.trained.coordinates import REST, Coordinates
 from pneunet.reduced.training.fit import fit_path, fit_strains
@@ -25,7 +25,7 @@ def analytic_strains(states: States) -> np.ndarray:
     out, law, material = np.full(states.strains.shape, np.nan), AnalyticLaw(), NeoHookean(mu=1.0)
     for number in np.unique(states.design):
         rows = np.flatnonzero(states.design == number)
-        segment = segment_of(states.kind, states.shape[rows[0]], PITCH, material)
+        segment = segment_of(states.kind, states.numbers[rows[0], : len(SHAPE)], PITCH, material)
         for last in range(len(rows), 0, -1):
             try:
                 found = law.strains(segment, states.pressure[rows[:last]])
@@ -38,8 +38,8 @@ def analytic_strains(states: States) -> np.ndarray:
 
 def compare_laws(training: Sample, held_out: Sample) -> list[tuple[str, float, float, float]]:
     """[(law of the free strains, median error, 95th percentile, share without an answer)] on the coarsest
-    mesh."""
-    train, test = (sample.on(0).free.loaded for sample in (training, held_out))
+    grid."""
+    train, test = (sample.free.loaded for sample in (training, held_out))
     a_train, a_test = (analytic_strains(states) for states in (train, test))
     co = Coordinates(train.kind)
     good = np.isfinite(a_train).all(axis=1)
@@ -47,14 +47,16 @@ def compare_laws(training: Sample, held_out: Sample) -> list[tuple[str, float, f
     a, q = (a_train[good] - REST) * w, (train.strains[good] - REST) * w
     factor = (a * q).sum(axis=0) / np.maximum((a * a).sum(axis=0), 1e-30)
     with np.errstate(invalid="ignore", divide="ignore"):
-        learned = [co.learned_strains(s.shape, s.pressure, a) for s, a in ((train, a_train), (test, a_test))]
-    values = co.learned_strains(train.shape, train.pressure, train.strains)
+        learned = [
+            co.learned_strains(s.numbers, s.pressure, a) for s, a in ((train, a_train), (test, a_test))
+        ]
+    values = co.learned_strains(train.numbers, train.pressure, train.strains)
     by_pressure = []
     for y, known in ((values, np.zeros(1)), (values - learned[0], learned[1])):
         process = fit_strains(train, np.isfinite(y).all(axis=1), train.inputs, y)
         found = process(test.inputs) + known
-        by_pressure.append(co.strains(test.shape, test.pressure * np.exp(-found[:, 0]), found[:, 1:]))
-    along = [fit_path(train, slopes=slopes).strains(test.shape, test.pressure, 0) for slopes in (False, True)]
+        by_pressure.append(co.strains(test.numbers, test.pressure * np.exp(-found[:, 0]), found[:, 1:]))
+    along = [fit_path(train, slopes=slopes).strains(test.numbers, test.pressure) for slopes in (False, True)]
     laws = {
         "calibrated analytic model": REST + factor * (a_test - REST),
         "regressor of the states, by the pressure": by_pressure[0],
@@ -74,12 +76,12 @@ def _spread(error):
 def learning_curve(training: Sample, held_out: Sample) -> list[tuple[int, float, float]]:
     """[(designs trained on, median error, 95th percentile)] of the free strains for the first parts of the
     training designs."""
-    states, test = (sample.on(0).free.loaded for sample in (training, held_out))
+    states, test = (sample.free.loaded for sample in (training, held_out))
     numbers, rows = np.unique(states.design), []
     for part in CURVE:
         some = numbers[: max(8, round(part * len(numbers)))]
         path = fit_path(states.of(np.isin(states.design, some)))
-        rows.append((len(some), *_spread(strain_error(test, path.strains(test.shape, test.pressure, 0)))))
+        rows.append((len(some), *_spread(strain_error(test, path.strains(test.numbers, test.pressure)))))
     return rows
 
 

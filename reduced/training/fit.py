@@ -3,29 +3,28 @@ stiffness, the enthalpy around them, and intervals from the residuals of a cross
 (conformal, with the process's deviation as their shape).
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from pneunet.reduced.trained.closing import Closing
 from pneunet.reduced.trained.coordinates import Coordinates, cosine, odd
+from pneunet.reduced.trained.enthalpy import symmetric
 from pneunet.reduced.trained.free_path import FreePath
 from pneunet.reduced.trained.free_stiffness import FreeStiffness, order
-from pneunet.reduced.trained.law import LOWEST, KindLaw
+from pneunet.reduced.trained.kind_law import LOWEST, KindLaw
+from pneunet.reduced.trained.mesh import MeshDifference
+from pneunet.reduced.trained.recorded import Recorded
 from pneunet.reduced.trained.side_by_side import SideBySide
 from pneunet.reduced.training.anharmonic import fit_anharmonic
-from pneunet.reduced.training.judging import symmetric
 from pneunet.reduced.training.landmarks import LANDMARKS, with_cheap_doubt
+from pneunet.reduced.training.meshes import INTERVAL, converged_sample, fit_meshes
 from pneunet.reduced.training.regression import LOG_NOISES, FitSettings, Slopes, fit_side_by_side
+from pneunet.reduced.training.slopes import in_deviations, known_slopes, slopes_of, told_by_angle
 from pneunet.reduced.training.states import Sample, States, folds
-
-#: what a process is given, or gives, of each state
-OfStates = Callable[[States], np.ndarray]
 
 #: of the cross-validation that intervals come from
 FOLDS = 10
-INTERVAL = 0.9
 #: the training designs' ranges are widened by this part before a design is outside
 MARGIN = 0.02
 
@@ -33,15 +32,11 @@ MARGIN = 0.02
 #: millisecond; those of how walls close; those of the rough process that the search for the leading strain
 #: starts from: within some 3 % of it (measured: median), from where one step is mostly enough; and those of
 #: the stiffness
-INDUCING, CLOSING, ROUGH, OF_STIFFNESS = 1600, 1000, 300, 2200
+INDUCING, CLOSING, ROUGH, OF_STIFFNESS, OF_RECORDED = 1600, 1000, 300, 2200, 600
 #: times the largest leading strain of the training designs: up to there paths of free states are followed
 FURTHEST = 1.2
 #: a deviation above this many times the largest one at the training points, rest included, is outside
 DOUBT = 2.0
-#: step of central differences along directions of shape (degrees, normal pitches): the transformations are
-#: smooth there
-STEP = 1e-4
-
 #: of what is learned (of the strains: the leading one's logarithm) over a standard deviation of the inputs:
 #: above that a state is next to its limit load or walls are just touching, where derivatives grow without
 #: bound. (Those of the stiffness where walls touch are left out altogether; measured: with them its error is
@@ -54,36 +49,8 @@ CONTACT_NOISES = tuple((low, np.log(most)) for (low, _), most in zip(LOG_NOISES,
 #: states that the metric of how far walls close is found on: without slopes, and with one output, more cost
 #: little
 MANY = 1200
-#: of the angle, below which derivatives along it are not used
-SMALLEST_COSINE = 0.2
-
-
-def slopes_of(
-    states: States, known: np.ndarray, inputs: OfStates, outputs: OfStates, some: np.ndarray
-) -> Slopes:
-    """Slopes of the states where they are `known` (n, s), among those that are `some` (n,).
-
-    inputs, outputs: what the process sees.
-    """
-    at, way = np.nonzero(known & some[:, None])
-    s, change = states.of(at), {"shape": states.directions[way]}
-    change |= {"strains": states.strain_slopes[at, way], "matrices": states.matrix_slopes[at, way]}
-    low, high = (
-        replace(s, **{name: getattr(s, name) + step * slope for name, slope in change.items()})
-        for step in (-STEP, STEP)
-    )
-    ways, values = ((f(high) - f(low)) / (2 * STEP) for f in (inputs, outputs))
-    return Slopes((np.cumsum(some) - 1)[at], ways, values)
-
-
-def in_deviations(slopes: Slopes, inputs: np.ndarray) -> np.ndarray:
-    """(r, p) Slopes over a standard deviation of the inputs (n, d)."""
-    return slopes.in_units(np.maximum(inputs.std(axis=0), 1e-12)).values
-
-
-def told_by_angle(states: States) -> np.ndarray:
-    """(n, s) bool: not along the angle near 90 degrees, where what is odd in its cosine is divided by it."""
-    return (np.abs(cosine(states.shape)) > SMALLEST_COSINE)[:, None] | (states.directions[:, 0] == 0)
+#: those that the metric of what is recorded besides is found on
+FEW = 200
 
 
 def fit_path(
@@ -99,23 +66,23 @@ def fit_path(
     def inputs(s: States) -> np.ndarray:
         with np.errstate(invalid="ignore"):
             lead = co.leading(s.strains)
-            return co.path_inputs(s.shape, lead, s.level, closing.overlap(s.shape, s.pressure, lead))
+            return co.path_inputs(s.numbers, lead, closing.overlap(s.numbers, s.pressure, lead))
 
     def outputs(s: States) -> np.ndarray:
         with np.errstate(invalid="ignore"):
-            return co.learned_strains(s.shape, s.pressure, s.strains)
+            return co.learned_strains(s.numbers, s.pressure, s.strains)
 
     x, y = inputs(states), outputs(states)
     good = np.isfinite(y).all(axis=1)  # the leading strain is larger than 0
     steep = None
     if slopes:
-        known = np.isfinite(states.strain_slopes).all(axis=2) & told_by_angle(states)
+        known = known_slopes(states.strain_slopes) & told_by_angle(states)
         steep = slopes_of(states, known, inputs, outputs, good)
         steep = steep.of((np.abs(in_deviations(steep, x[good])) < STEEPEST).all(axis=1))
     learned = fit_strains(states, good, x, y, steep, like.learned if like else None, again)
     rough, trust = FitSettings(inducing=ROUGH), np.ones((good.sum(), 1))
     start = fit_side_by_side(
-        states.inputs[good], -y[good, :1], states.case[good], trust, (1,), settings=rough
+        states.inputs[good], -y[good, :1], states.design[good], trust, (1,), settings=rough
     )
     furthest = FURTHEST * float(co.leading(states.strains).max())
     none, first = np.zeros((2, 2)), np.arange(min(LANDMARKS, len(learned.processes[0].inducing)))
@@ -134,8 +101,8 @@ def fit_strains(
     """SideBySide processes of Coordinates.learned_strains y (n, p) at inputs x (n, d) of the States that are
     `good` (n,), the leading strain's first; slopes: at those; like, again: as for
     regression.fit."""
-    trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.shape)))
-    data = x[good], y[good], states.case[good], trust[good]
+    trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.numbers)))
+    data = x[good], y[good], states.design[good], trust[good]
     settings = FitSettings(inducing=INDUCING, again=again)
     return fit_side_by_side(*data, (1, y.shape[1] - 1), slopes, like, settings)
 
@@ -146,8 +113,8 @@ def fit_closing(states: States, like: SideBySide | None = None, again: bool = Fa
         return Closing(states.kind, None)
     states = states.of(np.isfinite(states.closing))
     co = Coordinates(states.kind)
-    x = co.closing_inputs(states.shape, co.closing_load(states.pressure, co.leading(states.strains)))
-    data = x, states.closing[:, None], states.case, np.ones((len(x), 1))
+    x = co.closing_inputs(states.numbers, co.closing_load(states.pressure, co.leading(states.strains)))
+    data = x, states.closing[:, None], states.design, np.ones((len(x), 1))
     settings = FitSettings(most=MANY, inducing=CLOSING, again=again)
     return Closing(states.kind, fit_side_by_side(*data, (1,), like=like, settings=settings))
 
@@ -157,16 +124,16 @@ def fit_stiffness(
 ) -> FreeStiffness:
     """The FreeStiffness of free states whose walls close as the Closing says."""
     co = Coordinates(states.kind)
-    y = co.learned_stiffness(states.shape, states.matrices)
+    y = co.learned_stiffness(states.numbers, states.matrices)
     good, touching = np.isfinite(y).all(axis=1), states.touching
     if closing.process is None or len(np.unique(states.design[touching & good])) < TELLING:
         return FreeStiffness(states.kind, _fit_smooth(states.of(good), like, again), None)
     smooth = _fit_smooth(states.of(good & ~touching), like, again)
     states, y = states.of(good & touching), y[good & touching]
-    closed = closing.closed(states.shape, states.pressure, states.strains)
-    added = (y - smooth(co.stiffness_inputs(states.shape, states.strains, states.level)))[:, order(co)]
+    closed = closing.closed(states.numbers, states.pressure, states.strains)
+    added = (y - smooth(co.stiffness_inputs(states.numbers, states.strains)))[:, order(co)]
     trust = _trust_in_stiffness(states)[:, order(co)]
-    data = co.contact_inputs(states.shape, states.strains, closed), added, states.case, trust
+    data = co.contact_inputs(states.numbers, states.strains, closed), added, states.design, trust
     known, settings = like.contact if like else None, FitSettings(again=again, noises=CONTACT_NOISES)
     contact = fit_side_by_side(*data, (1, added.shape[1] - 1), like=known, settings=settings)
     return FreeStiffness(states.kind, smooth, contact)
@@ -175,7 +142,7 @@ def fit_stiffness(
 def _trust_in_stiffness(states):
     """(n, p) trust of regression.fit in what is learned of the stiffness: what is odd in the angle's cosine
     was divided by it."""
-    return odd(Coordinates(states.kind).stiffness_parity, np.abs(cosine(states.shape)))
+    return odd(Coordinates(states.kind).stiffness_parity, np.abs(cosine(states.numbers)))
 
 
 def _fit_smooth(states, like, again):
@@ -183,43 +150,70 @@ def _fit_smooth(states, like, again):
     co = Coordinates(states.kind)
 
     def inputs(s: States) -> np.ndarray:
-        return co.stiffness_inputs(s.shape, s.strains, s.level)
+        return co.stiffness_inputs(s.numbers, s.strains)
 
     def outputs(s: States) -> np.ndarray:
-        return co.learned_stiffness(s.shape, s.matrices)
+        return co.learned_stiffness(s.numbers, s.matrices)
 
     x, y = inputs(states), outputs(states)
-    known = np.isfinite(states.matrix_slopes).all(axis=(2, 3)) & told_by_angle(states)
+    known = known_slopes(states.matrix_slopes) & told_by_angle(states)
     known &= ~states.touching[:, None]
     steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
     steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
-    data = x, y, states.case, _trust_in_stiffness(states)
+    data = x, y, states.design, _trust_in_stiffness(states)
     settings = FitSettings(inducing=OF_STIFFNESS, again=again)
     return fit_side_by_side(*data, (y.shape[1],), steep, like.smooth if like else None, settings)
 
 
 def fit_kind(sample: Sample, like: KindLaw | None = None, again: bool = True) -> KindLaw:
     """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts,
-    or, unless `again`, which are taken as they are."""
+    or, unless `again`, which are taken as they are. With finer grids the coarse one is learned first, then
+    what they change, and what that gives in the same way."""
+    mesh, known = MeshDifference.none(sample.free.kind), (like.path, like.stiffness) if like else (None, None)
+    if sample.finer:
+        path = fit_path(sample.free, like.path if like else None, again)
+        stiffness = fit_stiffness(sample.free, path.closing, like.stiffness if like else None, again)
+        mesh, again = fit_meshes(sample, path, stiffness), False
+        sample, known = converged_sample(sample, mesh), (path, stiffness)
     states, around = sample.free, sample.around
-    path = fit_path(states, like.path if like else None, again)
-    stiffness = fit_stiffness(states, path.closing, like.stiffness if like else None, again)
+    path = fit_path(states, known[0], again)
+    stiffness = fit_stiffness(states, path.closing, known[1], again)
     co = Coordinates(states.kind)
-    closed = path.closing.closed(around.shape, around.pressure, around.strains)
-    x = co.around_inputs(around.shape, around.strains, closed)
+    closed = path.closing.closed(around.numbers, around.pressure, around.strains)
+    x = co.around_inputs(around.numbers, around.strains, closed)
     anharmonic = fit_anharmonic(
-        states.kind, x, cosine(around.shape), symmetric(around.matrices), sample.change, sample.forces
+        states.kind, x, cosine(around.numbers), symmetric(around.matrices), sample.change, sample.forces
     )
-    x = co.ranged(states.shape, states.pressure, states.level)
-    level = int(states.level.max())
-    _, _, there = path.at(states.shape, np.maximum(states.pressure, LOWEST), level)
+    x = co.ranged(states.numbers, states.pressure)
+    _, _, there = path.at(states.numbers, np.maximum(states.pressure, LOWEST))
     doubt = DOUBT * float(path.learned.processes[0].deviation(there).max())
     path = with_cheap_doubt(path, there)
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
     low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
     low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
-    law = KindLaw(states.kind, path, stiffness, anharmonic, np.ones(6), low, high, doubt, level)
+    # where the sample of silicones begins: a neo-Hookean one
+    low[co.stiffening] = np.minimum(low[co.stiffening], 0.0)
+    besides = fit_recorded(states, path.closing)
+    law = KindLaw(states.kind, path, stiffness, anharmonic, besides, mesh, np.ones(6), low, high, doubt)
     return replace(law, quantile=_quantiles(law, states.loaded, sample.drawn))
+
+
+def fit_recorded(states: States, closing: Closing) -> Recorded | None:
+    """The Recorded of free states; None where their stretch is not known."""
+    states = states.of((states.pressure > 0) & np.isfinite(states.stretch))
+    if not len(states.stretch):
+        return None
+    lead = Coordinates(states.kind).leading(states.strains)
+    states, lead = states.of(lead > 0), lead[lead > 0]
+    over = closing.overlap(states.numbers, states.pressure, lead)
+    x = Coordinates(states.kind).path_inputs(states.numbers, lead, over)
+    y = np.log(np.column_stack([(states.stretch - 1) / lead, states.volume]))
+    trust = np.ones(y.shape)
+    return Recorded(
+        fit_side_by_side(
+            x, y, states.design, trust, (1, 1), settings=FitSettings(most=FEW, inducing=OF_RECORDED)
+        )
+    )
 
 
 def _quantiles(law, states, drawn):
@@ -230,7 +224,7 @@ def _quantiles(law, states, drawn):
     for judged in folds(np.unique(states.design[states.design < drawn]), FOLDS):
         out = np.isin(states.design, judged)
         path, t = fit_path(states.of(~out), like=law.path), states.of(out)
-        spread = path.spread(t.shape, t.pressure, t.level, exact=True)
-        miss = np.abs(path.strains(t.shape, t.pressure, t.level) - t.strains)
+        found, spread = path.strains_and_spread(t.numbers, t.pressure, exact=True)
+        miss = np.abs(found - t.strains)
         scores.append(np.divide(miss, spread, out=np.zeros_like(miss), where=spread > 0))
     return np.quantile(np.concatenate(scores), INTERVAL, axis=0)

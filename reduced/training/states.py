@@ -10,37 +10,37 @@ from pneunet.reduced.trained.coordinates import REST, Coordinates
 
 #: held-out designs that suffice to judge a law; with fewer the training designs are judged too, by laws that
 #: have not seen them
-ENOUGH = 100
+ENOUGH = 50
 #: parts that the training designs fall into for that
 PARTS = 10
-#: designs on a finer mesh that suffice to learn what it changes (measured: from two of them the law's guess
-#: was three times off)
-COMMON = 10
 #: of a pressure: nearer to that of a state, first touch is known to lie before it, not where
 NEAR = 1e-4
 
 
 @dataclass(frozen=True)
 class States:
-    """Free states of one kind, rest included: shape (n, 13), pressure (n,), strains (n, 6), matrices (n, 6,
-    6), design (n,) numbers, level (n,) of the mesh, the finest last, size (n,): norm of the free strains,
-    rest taken off, at the case's top pressure; closing (n,): how far walls have come nearer, as if they could
-    go on in the first state after touch, over the load (Coordinates.closing_load) and the normal pitch; nan
-    in the states beyond and at rest. touching (n,) bool. strain_slopes (n, s, 6), matrix_slopes (n, s, 6, 6):
-    derivatives along the `directions` (s, 13) of shape, nan where not known."""
+    """Free states of one kind on one grid, rest included: numbers (n, 15), pressure (n,), strains (n, 6),
+    matrices (n, 6, 6), design (n,) numbers, size (n,): norm of the free strains, rest taken off, at the
+    case's top pressure; closing (n,): how far walls have come nearer, as if they could go on in the first
+    state after touch, over the load (Coordinates.closing_load) and the normal pitch; nan in the states beyond
+    and at rest. touching (n,) bool; stretch (n,): the largest; volume (n,) of air. strain_slopes (n, s, 6),
+    matrix_slopes (n, s, 6, 6): derivatives along the `directions` (s, 15) of the numbers, nan where not
+    known, while the pressure changes by pressure_slopes (n, s)."""
 
     kind: str
-    shape: np.ndarray
+    numbers: np.ndarray
     pressure: np.ndarray
     strains: np.ndarray
     matrices: np.ndarray
     design: np.ndarray
-    level: np.ndarray
     size: np.ndarray
     closing: np.ndarray
     touching: np.ndarray
+    stretch: np.ndarray
+    volume: np.ndarray
     strain_slopes: np.ndarray
     matrix_slopes: np.ndarray
+    pressure_slopes: np.ndarray
     directions: np.ndarray
 
     def of(self, chosen: np.ndarray) -> "States":
@@ -53,57 +53,40 @@ class States:
         return self.of(self.pressure > 0)
 
     @property
-    def case(self) -> np.ndarray:
-        """(n,) equal for the states of one design on one mesh."""
-        return self.design * (1 + self.level.max(initial=0)) + self.level
-
-    @property
     def inputs(self) -> np.ndarray:
         """(n, d) Coordinates.inputs."""
-        return Coordinates(self.kind).inputs(self.shape, self.pressure, self.level)
+        return Coordinates(self.kind).inputs(self.numbers, self.pressure)
+
+    def joined(self, other: "States") -> "States":
+        """These, then the others."""
+        both = {f.name: (getattr(self, f.name), getattr(other, f.name)) for f in fields(self)[1:-1]}
+        return replace(self, **{name: np.concatenate(pair) for name, pair in both.items()})
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Cells of one kind: free States, and of those at prescribed strains the free state (`around`, States),
-    the change (m, 6) of the strains from there and the forces (m, 6). Designs with a number below `drawn` are
-    the sample's, as held-out ones are; others were chosen."""
+    """Cells of one kind on the coarsest grid: free States, and of those at prescribed strains the free state
+    (`around`, States), the change (m, 6) of the strains from there, the forces (m, 6), and doubled (m,) bool:
+    whether the strains are twice the free ones, others than those went in some direction. finer: free States
+    of some of the designs on finer grids, the finest last. Designs with a number below `drawn` are the
+    sample's, as held-out ones are; others were chosen."""
 
     free: States
     around: States
     change: np.ndarray
     forces: np.ndarray
+    doubled: np.ndarray
+    finer: tuple[States, ...] = ()
     drawn: float = np.inf
 
     def of(self, designs: np.ndarray) -> "Sample":
         """Those of the designs with these numbers."""
+        free, *finer = (s.of(np.isin(s.design, designs)) for s in (self.free, *self.finer))
         held = np.isin(self.around.design, designs)
-        return self._with(self.free.of(np.isin(self.free.design, designs)), held)
-
-    def on(self, level: int) -> "Sample":
-        """Those on one mesh."""
-        held = self.around.level == level
-        return self._with(self.free.of(self.free.level == level), held)
-
-    def on_common_meshes(self) -> "Sample":
-        """Those on the coarsest mesh and on others that at least COMMON designs are computed on."""
-        free, held = self.free, self.around
-        rare = [
-            level
-            for level in np.unique(free.level)
-            if level and len(np.unique(free.design[free.level == level])) < COMMON
-        ]
-        kept = ~np.isin(held.level, rare)
-        return self._with(free.of(~np.isin(free.level, rare)), kept)
-
-    def _with(self, free, held):
-        return Sample(free, self.around.of(held), self.change[held], self.forces[held], self.drawn)
-
-    @property
-    def doubled(self) -> np.ndarray:
-        """(m,) bool: prescribed are twice the free strains, others than those went in some direction."""
-        free = self.around.strains - REST
-        return np.linalg.norm(self.change - free, axis=1) < 1e-3 * np.linalg.norm(free, axis=1)
+        around = self.around.of(held)
+        return Sample(
+            free, around, self.change[held], self.forces[held], self.doubled[held], tuple(finer), self.drawn
+        )
 
     @property
     def designs(self) -> np.ndarray:
@@ -115,40 +98,52 @@ def sample_of(data: CellData, kind: str, held_out: bool) -> Sample:
     """The Sample of a kind's accepted cases in CellData, of the held-out designs or of all others."""
     k = data.about["kinds"].index(kind)
     cases = data.accepted & (data.kind == k) & (data.held_out == held_out)
-    sizes = [min(size for key, size in mesh.items() if key != "name") for mesh in data.about["meshes"]]
-    level = np.argsort(np.argsort(-np.array(sizes)))
-    rows = np.flatnonzero(cases[data.case] & ~data.overlapping)
-    free, held = rows[~data.prescribed[rows]], rows[data.prescribed[rows]]
-    directions = np.array(data.about["directions"][kind])
-    top = {}
-    for i in free:  # pressures increase
-        top[data.case[i]] = np.linalg.norm(data.strains[i] - REST)
+    sizes = [min(size for key, size in mesh.items() if key.endswith("_mm")) for mesh in data.about["meshes"]]
+    coarsest, *finer = np.argsort(-np.array(sizes))
+    usable = cases[data.case] & ~data.overlapping
+    states, row = _free_states(data, kind, np.flatnonzero(usable & (data.mesh[data.case] == coarsest)))
+    held = np.array([i for i in np.flatnonzero(usable & data.prescribed) if _state(data, i) in row], int)
+    where = np.array([row[_state(data, i)] for i in held], int)
+    change = data.strains[held].astype(float) - states.strains[where]
+    free = states.strains[where] - REST
+    doubled = np.linalg.norm(change - free, axis=1) < 1e-3 * np.linalg.norm(free, axis=1)
+    others = (_free_states(data, kind, np.flatnonzero(usable & (data.mesh[data.case] == m))) for m in finer)
+    known = tuple(s for s, _ in others if len(s.design))
+    drawn = data.about["campaign"].get("designs", np.inf)
+    return Sample(states, states.of(where), change, data.forces[held].astype(float), doubled, known, drawn)
+
+
+def _state(data, i):
+    """What a free state and those prescribed at its pressure have in common."""
+    return data.case[i], round(float(data.pressure[i]), 6)
+
+
+def _free_states(data, kind, rows):
+    """(States of those of the data set's rows that are free, {_state: place among them})."""
+    free = rows[~data.prescribed[rows]]
+    case, directions = data.case[free], np.array(data.about["directions"][kind], float)
+    top = {data.case[i]: np.linalg.norm(data.strains[i] - REST) for i in free}  # pressures increase
     closing = {
-        i: rate
-        for case in top
-        for i, rate in _closing(data, free[data.case[free] == case], Coordinates(kind))
+        i: rate for number in top for i, rate in _closing(data, free[case == number], Coordinates(kind))
     }
-    at = {(data.case[i], round(float(data.pressure[i]), 6)): n for n, i in enumerate(free)}
     states = States(
         kind,
-        data.shape[data.case[free]].astype(float),
+        np.hstack([data.shape[case], data.stiffening[case]]).astype(float),
         data.pressure[free].astype(float),
         data.strains[free].astype(float),
         data.matrices[free].astype(float),
-        data.design[data.case[free]],
-        level[data.mesh[data.case[free]]],
-        np.array([top[data.case[i]] for i in free]),
+        data.design[case],
+        np.array([top[number] for number in case]),
         np.array([closing.get(i, np.nan) for i in free]),
-        data.pressure[free] >= (1 - NEAR) * _met(data.first_touch[data.case[free]]),
+        data.pressure[free] >= (1 - NEAR) * _met(data.first_touch[case]),
+        data.largest_stretch[free].astype(float),
+        data.volume[free].astype(float),
         data.strain_slopes[free, : len(directions)].astype(float),
         full_matrices(data.stiffness_slopes[free, : len(directions)].astype(float)),
+        np.zeros((len(free), len(directions))),
         directions,
     )
-    held = np.array([i for i in held if (data.case[i], round(float(data.pressure[i]), 6)) in at], int)
-    where = np.array([at[data.case[i], round(float(data.pressure[i]), 6)] for i in held], int)
-    change = data.strains[held].astype(float) - states.strains[where]
-    drawn = data.about.get("campaign", {}).get("designs", np.inf)
-    return Sample(states, states.of(where), change, data.forces[held].astype(float), drawn)
+    return states, {_state(data, i): place for place, i in enumerate(free)}
 
 
 def _met(first_touch):

@@ -12,7 +12,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from pneunet.base.errors import InputError
 from pneunet.reduced.trained.gaussian import GaussianProcess
-from pneunet.reduced.trained.law import KindLaw
+from pneunet.reduced.trained.kind_law import KindLaw
 
 #: free states of a design that may have walls in touch, at equal pressures up to its top one
 LEVELS = 8
@@ -21,47 +21,50 @@ TOO_FEW = "{} designs are asked for, {} are on offer: offer more"
 
 def most_telling(
     law: KindLaw,
-    shape: np.ndarray,
+    numbers: np.ndarray,
     count: int,
     top_pressure: float,
     limit_share: float,
     touching: bool = False,
 ) -> np.ndarray:
-    """(count,) rows of shape numbers (n, 13) whose designs a KindLaw would learn most from, the most telling
+    """(count,) rows of numbers (n, 15) whose designs a KindLaw would learn most from, the most telling
     first.
 
     By the leading free strain at the top P/mu, or at `limit_share` of the limit load where that is less;
     touching: by what contact adds to the bending stiffness, from designs whose walls touch up to there.
     InputError where fewer are on offer.
     """
-    if len(shape) < count:
-        raise InputError(TOO_FEW.format(count, len(shape)))
-    pressure = np.full(len(shape), top_pressure)
-    _, beyond, _ = law.path.at(shape, pressure, 0)
+    if len(numbers) < count:
+        raise InputError(TOO_FEW.format(count, len(numbers)))
+    pressure = np.full(len(numbers), top_pressure)
+    _, beyond, _ = law.path.at(numbers, pressure)
     pressure *= np.where(beyond > 0, limit_share * np.exp(-beyond), 1.0)
     if touching:
         if law.stiffness.contact is None:
             raise InputError("the law has seen too few designs whose walls touch: leave out --touching")
         process = law.stiffness.contact.processes[0]
-        design, inputs = _touching(law, shape, pressure)
+        design, inputs = _touching(law, numbers, pressure)
     else:
-        process, design = law.path.learned.processes[0], np.arange(len(shape))
-        inputs = law.path.at(shape, pressure, 0)[-1]
+        process, design = law.path.learned.processes[0], np.arange(len(numbers))
+        inputs = law.path.at(numbers, pressure)[-1]
     blocks = [np.flatnonzero(design == number) for number in np.unique(design)]
     if len(blocks) < count:
         raise InputError(TOO_FEW.format(count, f"{len(blocks)} whose walls touch"))
     return np.unique(design)[greedy(process, inputs, blocks, count)]
 
 
-def _touching(law, shape, top):
+def _touching(law, numbers, top):
     """(design (m,), contact_inputs (m, d)) of the states at LEVELS pressures up to `top` (n,) where walls
     touch."""
-    design = np.repeat(np.arange(len(shape)), LEVELS)
-    shape, pressure = shape[design], top[design] * np.tile(np.arange(1, LEVELS + 1) / LEVELS, len(shape))
-    strains = law.path.strains(shape, pressure, 0)
-    closed = law.closed(shape, pressure, strains)
+    design = np.repeat(np.arange(len(numbers)), LEVELS)
+    numbers, pressure = (
+        numbers[design],
+        top[design] * np.tile(np.arange(1, LEVELS + 1) / LEVELS, len(numbers)),
+    )
+    strains = law.path.strains(numbers, pressure)
+    closed = law.closed(numbers, pressure, strains)
     met = closed > 1
-    return design[met], law.coordinates.contact_inputs(shape[met], strains[met], closed[met])
+    return design[met], law.coordinates.contact_inputs(numbers[met], strains[met], closed[met])
 
 
 def greedy(process: GaussianProcess, inputs: np.ndarray, blocks: list[np.ndarray], count: int) -> list[int]:

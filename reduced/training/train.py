@@ -2,29 +2,26 @@
 seen.
 
 Nothing of the held-out designs is used before the last table. Where they are few, laws trained on parts of
-the training designs are judged on the other ones too (reduced.training.states.splits); they find metric and
-noise anew.
+the training designs are judged on the other ones too (reduced.training.states.splits).
 """
 
 import hashlib
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.dataset import CellData, read_dataset
 from pneunet.base.files.folder import output_folder
 from pneunet.reduced.trained.file import read_law, write_law
-from pneunet.reduced.trained.law import KindLaw, TrainedLaw
+from pneunet.reduced.trained.kind_law import KindLaw
+from pneunet.reduced.trained.law import TrainedLaw
 from pneunet.reduced.training.comparing import compare_laws, curve_table, law_table, learning_curve
-from pneunet.reduced.training.fit import FOLDS, fit_kind, fit_path, fit_stiffness
-from pneunet.reduced.training.judging import Figures, Misses, figures, finest_mesh, further_angles, misses
-from pneunet.reduced.training.states import Sample, folds, sample_of, splits
+from pneunet.reduced.training.fit import FOLDS, fit_kind
+from pneunet.reduced.training.judging import Figures, Misses, figures, misses
+from pneunet.reduced.training.states import Sample, sample_of, splits
 
 log = logging.getLogger(__name__)
 
@@ -32,9 +29,6 @@ log = logging.getLogger(__name__)
 Map = Callable[[Callable, Iterable], Iterable]
 #: kind -> (training Sample, held-out Sample)
 Samples = dict[str, tuple[Sample, Sample]]
-
-#: of `designs_at_further_angles`: parts, and the least degrees that they lie further out
-FURTHER_PARTS, FURTHER_BY = 5, 1.0
 
 
 def samples_of(data: CellData) -> Samples:
@@ -49,10 +43,7 @@ def samples_of(data: CellData) -> Samples:
             log.info(f"{text}: too few, or no prescribed states: the law will not know this kind")
             continue
         log.info(text)
-        common = training.on_common_meshes()
-        if common.free.level.max() < training.free.level.max():
-            log.info(f"{kind}: too few designs on the finest mesh: the law is one of the coarser mesh")
-        out[kind] = common, held_out
+        out[kind] = training, held_out
     if not out:
         raise InputError(f"too few accepted designs of any kind to train on ({text})")
     return out
@@ -129,42 +120,22 @@ def _shown(results: Iterable, count: int, what: str) -> Iterator:
 
 def judge(laws: dict[str, KindLaw], samples: Samples, mapping: Map = map) -> dict[str, Figures]:
     """{kind: {figure: number}} of KindLaws on the designs that neither they nor, where those are few, laws of
-    parts have seen; and of the designs at further angles, as `designs_at_further_angles` gives them."""
+    parts have seen."""
     jobs = []
     for kind, law in laws.items():
         (_, held_out), *parts = splits(*samples[kind])
         jobs += [(misses, (law, held_out)), *[(judge_again, (law, *part)) for part in parts]]
-        jobs += [
-            (judge_free_states_again, (law, *part)) for part in designs_at_further_angles(*samples[kind])
-        ]
     done = iter(list(_shown(mapping(_do, jobs), len(jobs), "judged")))
     out = {}
     for kind, law in laws.items():
-        found = [next(done) for _ in splits(*samples[kind])]
-        further = [(judged.designs, next(done)) for _, judged in designs_at_further_angles(*samples[kind])]
-        out[kind] = figures(found) | finest_mesh(law, samples[kind][1]) | further_angles(further)
+        found = figures([next(done) for _ in splits(*samples[kind])])
+        out[kind] = found | {"law_mesh_uncertainty_rel": law.mesh.uncertainty}
     return out
 
 
 def judge_again(law: KindLaw, learned: Sample, judged: Sample) -> Misses:
-    """`misses` on a Sample of the law that another Sample gives."""
-    return misses(fit_kind(learned, law), judged)
-
-
-def judge_free_states_again(law: KindLaw, learned: Sample, judged: Sample) -> Misses:
-    """The same of the free states alone, with the law's own metrics."""
-    path = fit_path(learned.free, law.path)
-    stiffness = fit_stiffness(learned.free, path.closing, law.stiffness)
-    return misses(replace(law, path=path, stiffness=stiffness), judged)
-
-
-def designs_at_further_angles(training: Sample, held_out: Sample) -> list[tuple[Sample, Sample]]:
-    """[(what a law learns from, what it is judged on)]: the training designs that are clearly more slanted
-    than any held-out one, as edge designs may be, in parts; [] where they are few."""
-    slant, most = (np.abs(90 - sample.free.shape[:, 0]) for sample in (training, held_out))
-    further = np.unique(training.free.design[slant > most.max() + FURTHER_BY])
-    parts = folds(further, FURTHER_PARTS) if len(further) >= 2 * FURTHER_PARTS else []
-    return [(training.of(np.setdiff1d(training.designs, part)), training.of(part)) for part in parts]
+    """`misses` on a Sample of the law that another Sample gives, with the metrics of this one."""
+    return misses(fit_kind(learned, law, again=False), judged)
 
 
 def judged_on(training: Sample, held_out: Sample) -> str:

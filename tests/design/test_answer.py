@@ -21,7 +21,7 @@ from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import read_design_file
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced import predict
-from pneunet.reduced.analytic.clearance import gap_left, wall_stretch
+from pneunet.reduced.rod.clearance import gap_left, wall_stretch
 from tests.design.test_inverse import BASE, made
 from tests.design.toy_law import ToyLaw
 

@@ -16,7 +16,7 @@ from pneunet.geometry.cad import body as cad
 from pneunet.geometry.designfile import DesignFile, write_design_file
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.reduced.analytic.clearance import gap_left, wall_bulge, wall_stretch
+from pneunet.reduced.rod.clearance import gap_left, wall_bulge, wall_stretch
 from tests.design.toy_law import ToyLaw
 
 SILICONE = pn.silicone("Ecoflex 00-30")

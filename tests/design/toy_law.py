@@ -32,7 +32,7 @@ class ToyLaw(SegmentLaw):
             for j, place in enumerate(places):
                 stepped = values + STEP * np.eye(5)[j]
                 rows[:, place] = strains(segment.kind, *stepped).imag / STEP.imag
-        return StatesWithSlopes.of_strains(q, slopes)
+        return StatesWithSlopes.of_strains(q, slopes, segments, pressures)
 
 
 def strains(kind, angle, chamber_height, base_thickness, P, mu):

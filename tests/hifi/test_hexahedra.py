@@ -16,7 +16,7 @@ from pneunet.geometry.parameters import Manipulator
 from pneunet.geometry.reference_cases import CASES
 from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.cell.problem import CellProblem
-from pneunet.hifi.cell.slopes import Slopes
+from pneunet.hifi.cell.slopes import StateSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.fem import surface
@@ -113,7 +113,7 @@ def test_a_part_of_the_cell_has_the_whole_s_derivatives_by_the_shape(tmp_path):
         run_steps(path, 0.03, StepSize(first=0.01, smallest=1e-4))
         system.factorise()
         assert system.overreach > 0
-        slopes.append(Slopes(problem).of(system))
+        slopes.append(StateSlopes(problem).of(system))
         system.destroy()
     for whole, part in zip(*slopes):
         assert part == pytest.approx(whole, rel=1e-3, abs=1e-4 * np.abs(whole).max())

@@ -10,7 +10,7 @@ from pneunet.geometry.grids.morph import Morph
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import DIRECTIONS, changed
 from pneunet.hifi.cell.problem import CellProblem
-from pneunet.hifi.cell.slopes import Slopes
+from pneunet.hifi.cell.slopes import StateSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.path.control import LoadControl
@@ -41,7 +41,7 @@ def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_pa
     problem = CellProblem(segment, tmp_path / "cell.npz", contact=WallPenalty())
     home = problem.mesh.geometry.x.copy()
     system, state = solved(problem, pressure)
-    strains, stiffness = Slopes(problem).of(system)
+    strains, stiffness = StateSlopes(problem).of(system)
     # all is where it was: measured again, nothing has changed
     assert (problem.mesh.geometry.x == home).all() and problem.segment == segment
     system.factorise()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from pneunet.geometry.reference_cases import CASES
-from pneunet.reduced.analytic.clearance import gap_left, wall_bulge
+from pneunet.reduced.rod.clearance import gap_left, wall_bulge
 
 
 def plate(short, long, thickness, modulus):

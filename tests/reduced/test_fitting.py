@@ -8,7 +8,7 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.base.files.dataset import UPPER
 from pneunet.geometry.parameters import KINDS, ONE_SIDED, TWISTING
-from pneunet.geometry.shape_numbers import SHAPE, shape_numbers
+from pneunet.geometry.shape_numbers import SHAPE, numbers_of
 from pneunet.reduced.trained.coordinates import REST, Coordinates
 from pneunet.reduced.trained.enthalpy import monomials
 from pneunet.reduced.training.fit import fit_closing, fit_path, fit_stiffness
@@ -36,7 +36,7 @@ def test_how_far_walls_close_is_known_up_to_the_first_state_in_touch():
     first[:2] = 0.1, PRESSURES[2]  # between levels, where it is known; at one, before which it was
     free = sample_of(replace(data, first_touch=first), ONE_SIDED, False).free
     met, at_level, never = (free.of(free.design == design) for design in range(3))
-    gap, lead = met.shape[0, SHAPE.index("gap")], Coordinates(ONE_SIDED).leading(met.strains)
+    gap, lead = met.numbers[0, SHAPE.index("gap")], Coordinates(ONE_SIDED).leading(met.strains)
     touched = gap / np.interp(0.1, PRESSURES, lead)
     assert met.closing == pytest.approx(
         [np.nan, gap * PRESSURES[1] / lead[1], touched, np.nan, np.nan], nan_ok=True
@@ -67,10 +67,10 @@ def test_stiffness_jumps_where_walls_touch():
     closing = fit_closing(learned)
     stiffness, closed = (
         fit_stiffness(learned, closing),
-        closing.closed(seen.shape, seen.pressure, seen.strains),
+        closing.closed(seen.numbers, seen.pressure, seen.strains),
     )
     assert (closed > 1).tolist() == seen.touching.tolist() and 0.2 < seen.touching.mean() < 0.8
-    assert stiffness_error(seen, stiffness.at(seen.shape, seen.strains, closed, 0)).max() < 0.05
+    assert stiffness_error(seen, stiffness.at(seen.numbers, seen.strains, closed)).max() < 0.05
     few = learned.of(np.isin(learned.design, np.unique(learned.design)[:8]))
     assert fit_closing(few).process is None and fit_stiffness(few, fit_closing(few)).contact is None
 
@@ -81,6 +81,7 @@ def test_paths_of_free_states_have_a_kink_where_walls_touch(kind):
     more the cell strains."""
     data, rest = made_up_data(), np.zeros(6)
     rest[0] = 1.0
+    numbers = np.hstack([data.shape, data.stiffening]).astype(float)
     wall, gap = (data.shape[:, SHAPE.index(name)].astype(float) for name in ("wall", "gap"))
     first, strains, distance = (
         0.15 * np.exp(10 * (wall - 0.2)),
@@ -89,7 +90,7 @@ def test_paths_of_free_states_have_a_kink_where_walls_touch(kind):
     )
     place = {ONE_SIDED: 4, TWISTING: 0}[kind]
     for i, case in enumerate(data.case):
-        at_touch = true_free(kind, data.shape[case], first[case])[place] - rest[place]
+        at_touch = true_free(kind, numbers[case], first[case])[place] - rest[place]
         change, lead, factor = strains[i] - rest, strains[i, place] - rest[place], 1.0
         for _ in range(60):
             closed = factor * lead / at_touch if kind == ONE_SIDED else data.pressure[i] / first[case]
@@ -101,17 +102,17 @@ def test_paths_of_free_states_have_a_kink_where_walls_touch(kind):
     learned, seen = (sample_of(touched, kind, held_out).free.loaded for held_out in (False, True))
     told = fit_path(learned, slopes=False)
     untold = fit_path(replace(learned, touching=np.zeros(len(learned.design), bool)), slopes=False)
-    errors = [strain_error(seen, path.strains(seen.shape, seen.pressure, 0)) for path in (told, untold)]
+    errors = [strain_error(seen, path.strains(seen.numbers, seen.pressure)) for path in (told, untold)]
     assert (
         errors[0].max() < 0.03 and errors[0].mean() < errors[1].mean() / 2 and untold.closing.process is None
     )
-    shape, P, h = seen.shape[:1], np.array([0.25]), 1e-5
-    assert told.closing.overlap(shape, P, told.at(shape, P, 0)[0]) > 0
-    _, slopes = told.strains_and_slopes(shape, P, 0)
+    shape, P, h = seen.numbers[:1], np.array([0.25]), 1e-5
+    assert told.closing.overlap(shape, P, told.at(shape, P)[0]) > 0
+    _, slopes = told.strains_and_slopes(shape, P)
     for name, step in (("gap", h), ("wall", h), ("angle", 100 * h), ("pressure", h)):
         i = -1 if name == "pressure" else SHAPE.index(name)
-        by_shape, by_pressure = (step * np.eye(13)[i], 0.0) if i >= 0 else (np.zeros(13), step)
-        ends = [told.strains(shape + sign * by_shape, P + sign * by_pressure, 0)[0] for sign in (1, -1)]
+        by_shape, by_pressure = (step * np.eye(15)[i], 0.0) if i >= 0 else (np.zeros(15), step)
+        ends = [told.strains(shape + sign * by_shape, P + sign * by_pressure)[0] for sign in (1, -1)]
         assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slopes[0, :, i], rel=2e-3, abs=2e-5)
 
 
@@ -132,20 +133,20 @@ def test_beyond_a_limit_load_strains_stay_and_it_says_so():
         strains[i] = REST + (data.strains[i] - REST) * q / (data.strains[i] - REST)[place]
         pressure[i] = stiff(case) * q * (1 - q)
     train = sample_of(replace(data, strains=strains, pressure=pressure), ONE_SIDED, False).free
-    path, shape = fit_path(train), data.shape[:1].astype(float)
+    path, shape = fit_path(train), train.numbers[:1]
     limit = stiff(0) / 4
-    at = path.at(np.repeat(shape, 4, axis=0), limit * np.array([0.5, 0.9, 1.1, 1.5]), 0)
+    at = path.at(np.repeat(shape, 4, axis=0), limit * np.array([0.5, 0.9, 1.1, 1.5]))
     assert at[0][:2] == pytest.approx([(1 - np.sqrt(0.5)) / 2, (1 - np.sqrt(0.1)) / 2], rel=1e-2)
     assert at[1] == pytest.approx([0, 0, np.log(1.1), np.log(1.5)], abs=0.02)
     assert at[0][2:] == pytest.approx([0.5, 0.5], abs=0.06)
-    q, slopes = path.strains_and_slopes(shape, np.array([1.5 * limit]), 0)
+    q, slopes = path.strains_and_slopes(shape, np.array([1.5 * limit]))
     assert np.isfinite(q).all() and np.isfinite(slopes).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_learned_numbers_give_strains_and_stiffness_back(kind):
     rng, co = np.random.default_rng(2), Coordinates(kind)
-    shape = np.array([shape_numbers(design(kind, angle)) for angle in (50.0, 80.0)])
+    shape, _ = numbers_of([design(kind, angle) for angle in (50.0, 80.0)])
     P = np.array([0.1, 0.2])
     q = np.array([true_free(kind, s, p) for s, p in zip(shape, P)])
     learned = co.learned_strains(shape, P, q)

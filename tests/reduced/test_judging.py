@@ -8,7 +8,7 @@ import pytest
 from pneunet.geometry.parameters import ONE_SIDED
 from pneunet.reduced.trained.coordinates import REST
 from pneunet.reduced.training.judging import stiffness_error, strain_error, tip_error
-from pneunet.reduced.training.states import COMMON, ENOUGH, PARTS, Sample, States, splits
+from pneunet.reduced.training.states import ENOUGH, PARTS, Sample, States, splits
 
 
 def sample(designs):
@@ -16,9 +16,8 @@ def sample(designs):
     direction."""
     n = len(designs)
     values = {
-        "shape": np.ones((2 * n, 13)),
+        "numbers": np.ones((2 * n, 15)),
         "pressure": np.tile([0.0, 0.1], n),
-        "level": np.zeros(2 * n, int),
     }
     values |= {"size": np.ones(2 * n), "closing": np.full(2 * n, np.nan), "touching": np.zeros(2 * n, bool)}
     values |= {
@@ -29,13 +28,14 @@ def sample(designs):
         "strain_slopes": np.full((2 * n, 9, 6), np.nan),
         "matrix_slopes": np.full((2 * n, 9, 6, 6), np.nan),
     }
-    values |= {"directions": np.zeros((9, 13))}
+    values |= {"pressure_slopes": np.zeros((2 * n, 9)), "directions": np.zeros((9, 15))}
+    values |= {"stretch": np.ones(2 * n), "volume": np.ones(2 * n)}
     free = States(
         ONE_SIDED, *(({"design": np.repeat(designs, 2)} | values)[f.name] for f in fields(States)[1:])
     )
     around = free.of(np.repeat(np.flatnonzero(free.pressure > 0), 2))
     change = np.where(np.arange(2 * n)[:, None] % 2, 0.3 * np.eye(6)[5], around.strains - REST)
-    return Sample(free, around, change, change)
+    return Sample(free, around, change, change, np.arange(2 * n) % 2 == 0)
 
 
 def test_few_held_out_designs_are_joined_by_every_training_design_once():
@@ -56,21 +56,6 @@ def test_designs_that_were_chosen_teach_and_do_not_judge():
     _, *parts = splits(replace(sample(np.arange(37)), drawn=20), sample(np.arange(100, 110)))
     assert sorted(np.concatenate([judged.designs for _, judged in parts])) == list(range(20))
     assert all(set(learned.designs) == set(range(37)) - set(judged.designs) for learned, judged in parts)
-
-
-def test_a_mesh_of_few_designs_is_left_out():
-    many = sample(np.arange(2 * COMMON))
-    for fine, levels in ((COMMON - 1, {0}), (COMMON, {0, 1})):
-        states = [replace(s, level=(s.design < fine).astype(int)) for s in (many.free, many.around)]
-        two = replace(many, free=states[0], around=states[1])
-        kept = two.on_common_meshes()
-        assert set(kept.free.level) == levels == set(kept.around.level) and len(kept.change) == len(
-            kept.around.level
-        )
-
-
-def test_prescribed_states_are_told_apart():
-    assert sample(np.arange(3)).doubled.tolist() == [True, False] * 3
 
 
 def test_errors_of_known_differences():

@@ -5,7 +5,7 @@ import pytest
 
 from pneunet.base.errors import InputError
 from pneunet.geometry.parameters import TWISTING
-from pneunet.geometry.shape_numbers import shape_numbers
+from pneunet.geometry.shape_numbers import numbers_of
 from pneunet.hifi.runs.campaign.sample import RANGES, segments
 from pneunet.reduced import shipped_law
 from pneunet.reduced.training.regression import fit
@@ -30,13 +30,13 @@ def test_the_first_of_them_is_the_one_that_lowers_the_weighed_variance_most():
 
 def test_touching_designs_touch_and_are_no_more_than_are_on_offer():
     law = shipped_law().kinds[TWISTING]
-    shape = np.array([shape_numbers(s) for s in segments(TWISTING, RANGES[TWISTING], 40, 9)])
+    shape, _ = numbers_of(segments(TWISTING, RANGES[TWISTING], 40, 9))
     rows = most_telling(law, shape, 3, 0.3, 0.9, touching=True)
     pressure = np.full(3, 0.3)
-    _, beyond, _ = law.path.at(shape[rows], pressure, 0)
+    _, beyond, _ = law.path.at(shape[rows], pressure)
     pressure *= np.where(beyond > 0, 0.9, 1) * np.exp(-beyond)
     assert len(set(rows)) == 3
-    assert (law.closed(shape[rows], pressure, law.path.strains(shape[rows], pressure, 0)) > 1).all()
+    assert (law.closed(shape[rows], pressure, law.path.strains(shape[rows], pressure)) > 1).all()
     with pytest.raises(InputError, match="41 designs are asked for, 40 are on offer"):
         most_telling(law, shape, 41, 0.3, 0.9)
     with pytest.raises(InputError, match="40 designs are asked for, [0-9]+ whose walls touch are on offer"):

@@ -21,7 +21,7 @@ from pneunet.geometry.cad.cell import mesh_cell
 from pneunet.geometry.cad.grid import grid_cell
 from pneunet.geometry.designfile import segment_from_table
 from pneunet.hifi.cell.problem import CellProblem
-from pneunet.hifi.cell.slopes import Slopes
+from pneunet.hifi.cell.slopes import StateSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.cell.unfolding import unfolding
 from pneunet.hifi.contact.penalty import WallPenalty
@@ -113,7 +113,7 @@ class Sampler:
         self.every, self.largest_step = stiffness_slopes_every, largest_step
         self.mu = problem.segment.material.mu
         self.system = CellSystem(problem)
-        self.slopes = Slopes(problem) if slopes else None
+        self.slopes = StateSlopes(problem) if slopes else None
         self.options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
         self.walked = []  # PathStates of the scout, their parameter the pressure
         self.kept = []  # (CellState, state array) of the free states

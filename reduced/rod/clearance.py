@@ -57,13 +57,13 @@ def gap_left(segment: Segment, pressure: float) -> float:
     return segment.gap - 2 * wall_bulge(segment, pressure)
 
 
-def gap_left_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
-    """(the same, its derivatives (15,) by geometry.shape_numbers.SHAPE, in degrees and mm, and by the
-    pressure and the modulus in MPa)."""
+def closed_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
+    """(part of the gap that facing walls are estimated to have closed, they touch from 1 on; its derivatives
+    (15,) by geometry.shape_numbers.SHAPE, in degrees and mm, and by the pressure and the modulus in MPa)."""
     bulge, *by = _bulge(segment, pressure)
-    slopes = _by_variables(segment, pressure, *by)
-    slopes[SHAPE.index("gap")] -= 0.5
-    return segment.gap - 2 * bulge, -2 * slopes
+    slopes = 2 * _by_variables(segment, pressure, *by) / segment.gap
+    slopes[SHAPE.index("gap")] -= 2 * bulge / segment.gap**2
+    return 2 * bulge / segment.gap, slopes
 
 
 def wall_stretch(segment: Segment, pressure: float) -> float:
@@ -76,10 +76,8 @@ def allowed_stretch(segment: Segment) -> float:
     return 1 + SAFE * segment.material.elongation_at_break
 
 
-def wall_strain_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
-    """(part of the allowed strain that a wall is estimated to come to, its derivatives (15,) as in
-    `gap_left_and_slopes`); zeros where the elongation at break is not known."""
-    allowed = allowed_stretch(segment) - 1
+def wall_stretch_and_slopes(segment: Segment, pressure: float) -> tuple[float, np.ndarray]:
+    """(`wall_stretch`, its derivatives (15,) as in `closed_and_slopes`)."""
     bulge, by_height, by_length, *by_others = _bulge(segment, pressure)
     height, length = _sides(segment)
     short = min(height, length)
@@ -88,7 +86,7 @@ def wall_strain_and_slopes(segment: Segment, pressure: float) -> tuple[float, np
     by_height -= ratio / 2 * (height <= length)  # 2 bulge/short changes with the short side, too
     by_length -= ratio / 2 * (height > length)
     slopes = _by_variables(segment, pressure, by_height, by_length, *by_others)
-    return (stretch - 1) / allowed, by_ratio * 2 / short / allowed * slopes
+    return stretch, by_ratio * 2 / short * slopes
 
 
 def _arc(ratio):
