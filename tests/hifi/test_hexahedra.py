@@ -18,6 +18,7 @@ from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.slopes import Slopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.cell.unfolding import unfolding
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.fem import surface
 from pneunet.hifi.path.control import LoadControl
@@ -88,6 +89,21 @@ def test_in_a_part_of_the_cell_walls_touch_as_in_the_cell(name, pressure, tmp_pa
     assert states[0].contact.force > 0.01 and not states[0].walls_overlap
     agree(*states, 1e-7)
     assert energies[0] == pytest.approx(energies[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["one_sided_w10", "twist_w15"])
+def test_a_part_s_state_unfolded_is_an_equilibrium_of_the_cell(name, tmp_path):
+    segment = replace(CASES[name](60.0, 1), gap=0.1, material=NeoHookean(1.0))
+    part, whole = (touching(segment, tmp_path, p) for p in (True, False))
+    systems = [CellSystem(problem) for problem in (part, whole)]
+    path = EquilibriumPath(systems[0], LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    run_steps(path, 0.01, StepSize(first=0.005, smallest=1e-4))
+    systems[1].load, systems[1].state = 0.01, unfolding(part, whole)(systems[0].state)
+    residuals = [np.linalg.norm(system.residual()[0]) for system in systems]
+    assert residuals[1] < 2 * residuals[0] + 1e-10
+    assert whole.contact.energy() == pytest.approx(part.contact.energy(), rel=1e-8)
+    for system in systems:
+        system.destroy()
 
 
 def test_all_classes_count_unstable_directions(tmp_path):
