@@ -49,8 +49,8 @@ def made():
 
 
 def sweep(segment, path, mesh):
-    """(CPU seconds, strains (2, 6) at PRESSURES, curvatures times the pitch) of 0 to 50 kPa in 5 levels, with
-    the stiffness at each. mesh: size of tetrahedra, or (size, layer) of a grid."""
+    """(CPU seconds, strains (2, 6) at PRESSURES, curvatures times the pitch, largest stretches (2,)) of 0 to
+    50 kPa in 5 levels, with the stiffness at each. mesh: size of tetrahedra, or (size, layer) of a grid."""
     from pneunet.geometry.cad.cell import mesh_cell
     from pneunet.geometry.cad.grid import grid_cell
     from pneunet.hifi.cell.file import CellCase
@@ -66,7 +66,8 @@ def sweep(segment, path, mesh):
     follow_path(case, CellProblem(segment, path), states.append)
     at = {round(s.pressure, 6): s for s in states}
     strains = [[*at[p].strains.e, *(at[p].strains.k * segment.pitch)] for p in PRESSURES]
-    return time.process_time() - started, np.array(strains)
+    stretches = [at[p].largest_stretch for p in PRESSURES]
+    return time.process_time() - started, np.array(strains), np.array(stretches)
 
 
 def cells():
@@ -74,7 +75,7 @@ def cells():
     from pneunet.geometry.reference_cases import CASES
 
     meshes = {"tetrahedra": 2.0, "default": (1.5, None), "coarser": COARSER, "fine": FINER}
-    errors, ratios, rows = {mesh: [] for mesh in meshes}, [], []
+    errors, ratios, stretched, rows = {mesh: [] for mesh in meshes}, [], [], []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.npz"
         for name in KINDS:
@@ -85,15 +86,25 @@ def cells():
             fine, coarser = runs["fine"][1], runs["coarser"][1]
             extrapolated = fine + (fine - coarser) / ((COARSER[0] / FINER[0]) ** ORDER - 1)
             norm = np.linalg.norm(extrapolated - np.eye(6)[0], axis=1)
-            for mesh, (seconds, strains) in runs.items():
+            for mesh, (seconds, strains, stretches) in runs.items():
                 error = np.linalg.norm(strains - extrapolated, axis=1) / norm
                 errors[mesh].append(error.max())
-                rows.append({"case": name, "mesh": mesh, "cpu_seconds": seconds, "error_rel": error.tolist()})
+                rows.append(
+                    {
+                        "case": name,
+                        "mesh": mesh,
+                        "cpu_seconds": seconds,
+                        "error_rel": error.tolist(),
+                        "largest_stretch": stretches.tolist(),
+                    }
+                )
+            stretched.append(abs(runs["fine"][2] / runs["default"][2] - 1).max())
             ratios.append(runs["default"][0] / runs["tetrahedra"][0])
     return {
         "cell_grid_error_rel": float(max(errors["default"])),
         "cell_fine_grid_error_rel": float(max(errors["fine"])),
         "cell_tetrahedra_error_rel": float(max(errors["tetrahedra"])),
+        "stretch_mesh_rel": float(max(stretched)),
         "cell_default_vs_tets_ratio": float(max(ratios)),
         "cell_fine_cpu_seconds": float(max(r["cpu_seconds"] for r in rows if r["mesh"] == "fine")),
         "cell_default_cpu_seconds": float(max(r["cpu_seconds"] for r in rows if r["mesh"] == "default")),

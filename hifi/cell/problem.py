@@ -83,8 +83,7 @@ class CellProblem(MixedField):
         #: hifi.cell.symmetry.SymmetryClass: that of the free state, then the others
         self.classes = [SymmetryClass(self, chi, rollers or {}, used) for chi in characters(self.turns)]
         self._place()
-        solid = np.isin(self.cell_tags.values, (tags.BODY, tags.LAYER))
-        self.stretch = PrincipalStretch(self, self.cell_tags.indices[solid])
+        self.stretch = PrincipalStretch(self, [(tags.BODY, tags.LAYER)])
 
     def _place(self):
         """What depends on where the nodes are."""
