@@ -151,6 +151,7 @@ def follow_path(
             control, first = LoadControl(), min(0.02 * mu, case.pressure)
         marks = tuple(np.linspace(start, target, case.levels + 1)[1:])
         path = EquilibriumPath(system, control, options, start)
+        path.newton.current = not medium  # the tangent that was measured at rest
 
         def keep(step):
             nonlocal passed
