@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import cell, segments
+from benchmarks import cell, cell_grids, segments
 from benchmarks.tables import table
 
 ENERGY_INTERVALS = 16
@@ -261,7 +261,7 @@ def page(meta, folder):
 
 
 #: part -> lines that it adds to the page from its details
-SECTIONS = {"cell": cell.section, "segments": segments.section}
+SECTIONS = {"cell": cell.section, "cell-grids": cell_grids.section, "segments": segments.section}
 
 
 def _cook(details):

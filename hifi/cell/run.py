@@ -49,13 +49,13 @@ def solve_cell(
                 raise _Touched
             on_touch(pressure)
 
-        facts = _mesh(case, mesh_path, part=True)
+        facts = mesh_of(case, mesh_path, part=True)
         try:
             tell = _counted(on_state, told, "states"), _counted(on_limit_point, told, "limit points")
             return follow_path(case, CellProblem(case.segment, mesh_path), *tell, stop), facts
         except _Touched:
             pass
-    facts, medium = _mesh(case, mesh_path), case.medium if case.contact == "third-medium" else None
+    facts, medium = mesh_of(case, mesh_path), case.medium if case.contact == "third-medium" else None
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )
@@ -90,8 +90,9 @@ def _has_half_turns(case):
     return case.element == "hexahedra" and case.contact != "third-medium" and bool(alike)
 
 
-def _mesh(case, path, part=False):
-    """Facts of the mesh that the case asks for, of the whole cell or a part of it."""
+def mesh_of(case: CellCase, path: str | Path, part: bool = False) -> dict:
+    """Write the mesh that the case asks for, of the whole cell or of a part from which half turns make it;
+    its facts."""
     edge, gaps = case.mesh_size * EDGE if case.graded else None, case.contact == "third-medium"
     if case.element == "tetrahedra":
         return mesh_cell(case.segment, case.mesh_size, path, gaps=gaps, edge_size=edge)
