@@ -196,13 +196,15 @@ the same order.""".splitlines()
 def section(details):
     """Lines on both studies for docs/verification.md."""
     lines = ["## The unit cell on grids", "", *ABOUT, ""]
+    names = {"tetrahedra": f"tetrahedra, {TETRAHEDRA:g} mm", "default": f"hexahedra, {DEFAULT:g} mm"}
     rows = []
     for each in details["studies"]:
         for mesh, r in each["meshes"].items():
             strains = [f"{r['strains_e_k_pitch'][1][i]:.4f}" for i in (0, 1, 3, 4)]
             errors = [f"{error:.2%}" for error in r["error_rel"]]
             told = f"{r['cpu_seconds']:.1f}{', with stiffness' * r['stiffness']}"
-            rows.append([each["case"], mesh.removesuffix(", free"), r["cells"], *strains, *errors, told])
+            name = mesh.removesuffix(", free")
+            rows.append([each["case"], names.get(name, name), r["cells"], *strains, *errors, told])
         limit = each["extrapolated"][1]
         strains = [f"{limit[i]:.4f}" for i in (0, 1, 3, 4)]
         orders = [f"order {order:.2f}" for order in each["orders"]]
