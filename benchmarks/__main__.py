@@ -14,6 +14,7 @@ from pathlib import Path
 
 from benchmarks import (
     cell,
+    cell_grids,
     chain,
     compare,
     contact,
@@ -66,7 +67,10 @@ PARTS = {
     ),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "grids": (grids.made, "grids of 10,000 random segments and 500 random manipulators; some 4 minutes"),
-    "cell-grids": (grids.cells, "cells of both kinds on grids of hexahedra: errors, cost; some 10 minutes"),
+    "cell-grids": (
+        cell_grids.cells,
+        "cells of both kinds on grids of hexahedra, and with contact: errors, orders, cost; some 30 minutes",
+    ),
     "body-grids": (grids.bodies, "the tip of a body at rest on grids and tetrahedra; some 3 minutes"),
     "segments": (
         segments.against_segments,
