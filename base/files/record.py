@@ -19,8 +19,12 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def revision() -> str:
-    """Git revision of the checkout that this code runs from, with '-dirty' when it has local changes; the
-    package's version where the code is installed, whatever repository that is in."""
+    """Git revision of the checkout that this code runs from, with '-dirty' when it has local changes, or what
+    a copy without history says it is of; the package's version where the code is installed, whatever
+    repository that is in."""
+    told = ROOT / ".revision"
+    if told.exists():
+        return told.read_text().strip()
     if (ROOT / ".git").exists() and (ROOT / "pyproject.toml").exists():
         line = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=12"]
         try:

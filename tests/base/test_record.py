@@ -50,7 +50,7 @@ def test_revision_is_the_checkouts_commit(monkeypatch):
 
 
 def test_revision_of_installed_code_is_not_that_of_somebody_elses_repository(tmp_path, monkeypatch):
-    """Nor is that of a copy without a history of its own."""
+    """Nor is that of a copy without a history of its own, which may say what it is of."""
     subprocess.run(["git", "init", "-q", tmp_path], check=True)
     for root in (tmp_path / "lib" / "site-packages", tmp_path, tmp_path / "copy"):
         root.mkdir(parents=True, exist_ok=True)
@@ -58,3 +58,5 @@ def test_revision_of_installed_code_is_not_that_of_somebody_elses_repository(tmp
         assert record.revision() == version("pneunet")
         (tmp_path / "copy").mkdir(exist_ok=True)
         (tmp_path / "copy" / "pyproject.toml").write_text("")
+    (tmp_path / "copy" / ".revision").write_text("3a03395c\n")
+    assert record.revision() == "3a03395c"
