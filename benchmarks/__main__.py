@@ -16,6 +16,7 @@ from benchmarks import (
     cell,
     cell_grids,
     chain,
+    cluster,
     compare,
     contact,
     contact_page,
@@ -24,6 +25,7 @@ from benchmarks import (
     doubt,
     grids,
     house,
+    image,
     kills,
     law,
     moulds,
@@ -57,6 +59,18 @@ PARTS = {
     "kills": (kills.kills, "60 runs killed with SIGKILL at random moments and run again; some 6 minutes"),
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
+    "ci": (
+        cluster.ci,
+        "continuous integration from a clean clone, caches and images made anew, wall minutes; half an hour",
+    ),
+    "image": (
+        image.image,
+        "make image-test (all tests in the image), its demo beside that of make demo; some 20 minutes",
+    ),
+    "slurm": (
+        cluster.on_slurm,
+        "a study and a solve on a real SLURM, put back into the queue midway; needs slurm-wlm; a minute",
+    ),
     "door": (
         door.door,
         "1500 generated bad inputs at every door of the command line: one line each; some 5 minutes",
