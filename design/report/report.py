@@ -59,7 +59,7 @@ def _write(run, law, folder):
     body = _headline(run, comparison)
     for title, content in (
         ("Target, prediction, finite elements", lambda: _shapes(run, comparison, scene, folder)),
-        ("To turn by hand", lambda: framed(run.directory)),
+        ("To turn by hand", lambda: framed(run, law)),
         ("Errors", lambda: _errors(comparison, run)),
         ("Strains of the segments", lambda: _strains(run, comparison)),
         ("Load history", lambda: _history(run, law, folder)),
