@@ -23,9 +23,21 @@ def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iter
     """
     count = len(items) if total is None else total  # type: ignore[arg-type]
     started = told = time.monotonic()
-    for done, item in enumerate(items):
+    for done, item in enumerate(items, start=1):
+        yield item
         now = time.monotonic()
-        if done and now - told >= PAUSE:
+        if now - told >= PAUSE and done < count:
             told = now
             log.info(f"{done} of {count} {what}, {now - started:.0f} s, {eta(now - started, done / count)}")
-        yield item
+
+
+class Pace:
+    """Of work whose parts are not alike: when it began, and so when it will end."""
+
+    def __init__(self) -> None:
+        self.started = time.monotonic()
+
+    def left(self, done: float) -> str:
+        """'; ETA 12 s' when a share `done` (0 to 1) of the work is done; '' where it takes no time."""
+        seconds = time.monotonic() - self.started
+        return f"; {eta(seconds, done)}" if seconds / done >= PAUSE else ""

@@ -40,7 +40,7 @@ def _meshes(steps, i, key):
     look: dict[str, Any] = {"color": PLAIN, "smooth_shading": False}
     if key:
         body.point_data[key] = steps.fields[key][i]
-        look = {"scalars": key, "clim": steps.limits(key), "cmap": FIELDS[key][2].lower()}
+        look = {"scalars": key, "clim": steps.limits(key), "cmap": FIELDS[key][2]}
     things = [(body, look)]
     things.append((pyvista.lines_from_points(steps.lines[i]).tube(radius=0.4), {"color": LINE}))
     if steps.target is not None:
@@ -102,13 +102,13 @@ def window(steps: LoadSteps, off_screen: bool = False) -> Any:
 
     def draw():
         key = keys[now["key"]]
-        plotter.scalar_bars.clear()
+        for title in list(plotter.scalar_bars.keys()):
+            plotter.remove_scalar_bar(title, render=False)
         for number, (mesh, look) in enumerate(_meshes(steps, now["step"], key)):
             bar = {"title": FIELDS[key][0], "color": "black"} if "scalars" in look else None
+            look |= {"opacity": 1.0 if number else now["opacity"]}
             plotter.add_mesh(mesh, name=str(number), reset_camera=False, scalar_bar_args=bar, **look)
-        told = (
-            f"{steps.labels[now['step']]}\nc: another colour" if len(keys) > 1 else steps.labels[now["step"]]
-        )
+        told = f"{steps.labels[now['step']]}\nt: see through" + "\nc: another colour" * (len(keys) > 1)
         plotter.add_text(told, name="label", color="black", font_size=12)
 
     def to_step(value):

@@ -1,4 +1,4 @@
-"""Notebooks, without output; `python -m examples.notebooks` executes them (pip install 'pneunet[notebooks]')."""
+"""Notebooks, without output; `python -m examples.notebooks` executes them all."""
 
 from pathlib import Path
 
