@@ -29,6 +29,7 @@ from benchmarks import (
     kills,
     law,
     moulds,
+    notebooks,
     paper,
     paper_page,
     people,
@@ -124,7 +125,11 @@ PARTS = {
         compare.compare,
         "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
     ),
-    "view": (compare.view, "size of the page of `pneunet view` of the demo, after make demo; some seconds"),
+    "view": (
+        compare.view,
+        "sizes of the demo's page of `pneunet view` and of its report, after make demo; some seconds",
+    ),
+    "notebooks": (notebooks.notebooks, "the notebooks of examples/notebooks, executed; a minute"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "design": (
         design.design,
