@@ -92,7 +92,7 @@ class CellData:
     energy: np.ndarray = column("states", (), "f4", "stored, per length")
     unstable: np.ndarray = column("states", (), "i1", "unstable directions, free strains included")
     largest_stretch: np.ndarray = column(
-        "states", (), "f4", "principal stretch, mean over the most stretched 1 % of the solid"
+        "states", (), "f4", "largest principal stretch, mean over the most stretched hundredth"
     )
     residual: np.ndarray = column("states", (), "f4", "norm over mu pitch^2")
     wall_distance: np.ndarray = column(
