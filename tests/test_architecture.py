@@ -23,7 +23,7 @@ FLOORS = {
 #: rooms of a package from the ground up: a room's modules may import those of its own storey and below; "" is
 #: what lies in the package itself
 ROOMS = {
-    "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
+    "base": [{""}, {"files"}, {"system", "pictures"}, {"materials"}],
     "geometry": [{""}, {"grids", "moulds"}, {"cad"}],
     "hifi": [
         {"fem"},
