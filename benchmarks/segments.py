@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.tables import table
 
 CHAMBERS = (9, 30)
-COST_MESH, COST_LEVELS, COST_PRESSURE = 2.0, 4, 0.02  # mm; equal steps to that pressure in MPa
-STRAIN_MESH, STRAIN_PRESSURE = 1.0, 0.05
+COST_MESH, COST_LEVELS, COST_PRESSURE = 3.0, 4, 0.02  # mm; equal steps to that pressure in MPa
+STRAIN_MESH, STRAIN_PRESSURE = 1.5, 0.05
 
 
 def segment(chambers):
@@ -36,13 +36,13 @@ def walk(system, path, pressure, levels):
 
 
 def cell_step(folder):
-    from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.geometry.cad.grid import grid_cell
     from pneunet.hifi.cell.problem import CellProblem
     from pneunet.hifi.cell.system import CellSystem
     from pneunet.hifi.path.control import LoadControl
     from pneunet.hifi.path.equilibrium import EquilibriumPath
 
-    mesh_cell(segment(1), COST_MESH, folder / "cell.npz")
+    grid_cell(segment(1), COST_MESH, folder / "cell.npz", part=True)
     system = CellSystem(CellProblem(segment(1), folder / "cell.npz"))
     seconds, facts = walk(system, EquilibriumPath(system, LoadControl()), COST_PRESSURE, COST_LEVELS)
     facts["unknowns"] = system.problem.unknowns
@@ -64,7 +64,7 @@ def finite(folder, chambers, mesh_size):
     from pneunet.hifi.body.manipulator import ManipulatorSolve
 
     body = Manipulator((segment(chambers),))
-    mesh_manipulator(body, mesh_size, folder / str(chambers))
+    mesh_manipulator(body, mesh_size, folder / str(chambers), "hexahedra")
     return ManipulatorSolve(body, folder / str(chambers) / "manipulator.npz")
 
 
@@ -103,7 +103,8 @@ def against_segments():
         cell_step(folder)  # compiles the forms
         costs = {"cell": cell_step(folder), **{n: segment_step(folder, n) for n in CHAMBERS}}
         states = []
-        solve_cell(CellCase(segment(1), STRAIN_PRESSURE, STRAIN_MESH, 5), folder / "fine.npz", states.append)
+        case = CellCase(segment(1), STRAIN_PRESSURE, STRAIN_MESH, 5, element="hexahedra")
+        solve_cell(case, folder / "fine.npz", states.append)
         found, dofs = middle(folder)
     pitch, errors, rows = segment(1).pitch, [], []
     for pressure, (e, k) in found.items():

@@ -4,6 +4,7 @@ rest."""
 import numpy as np
 
 from pneunet.geometry import tags
+from pneunet.geometry.fillets import NO_CELL, refuse_fillets
 from pneunet.geometry.grids.morph import Morph
 from pneunet.geometry.grids.planes import SAME, along, lean, sideways, snapped, upright
 from pneunet.geometry.grids.tensor import CAVITY_AIR, CHANNEL_AIR, EMPTY, TensorGrid
@@ -29,6 +30,7 @@ def cell_grid(
     HALF_TURNS make the rest. like: a segment whose elements the grid has, as many between any two planes,
     whatever size they come to here: a response on such grids is smooth in the design.
     """
+    refuse_fillets([segment], NO_CELL)
     s = snapped(segment)
     twisting, planes = s.kind == TWISTING, like or s
     xi = along(planes).divided(size, layer)

@@ -40,7 +40,7 @@ def solve_cell(
     on_touch(pressure): told the pressure (MPa) of first touch, once, before the first state beyond it.
     ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
     """
-    facts, medium = _mesh(case, mesh_path), case.medium if case.contact == "third-medium" else None
+    facts, medium = mesh_of(case, mesh_path), case.medium if case.contact == "third-medium" else None
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )
@@ -54,8 +54,9 @@ def _has_half_turns(case):
     return case.element == "hexahedra" and case.contact != "third-medium" and bool(alike)
 
 
-def _mesh(case, path):
-    """Facts of the mesh that the case asks for, of the whole cell or, where that will do, a part of it."""
+def mesh_of(case: CellCase, path: str | Path) -> dict:
+    """Write the mesh that the case asks for, of the whole cell or, where that will do, of a part of it; its
+    facts."""
     edge, gaps = case.mesh_size * EDGE if case.graded else None, case.contact == "third-medium"
     if case.element == "tetrahedra":
         return mesh_cell(case.segment, case.mesh_size, path, gaps=gaps, edge_size=edge)
@@ -115,6 +116,7 @@ def follow_path(
             control, first = LoadControl(), min(0.02 * mu, case.pressure)
         marks = tuple(np.linspace(start, target, case.levels + 1)[1:])
         path = EquilibriumPath(system, control, options, start)
+        path.newton.current = not medium  # the tangent that was measured at rest
 
         def keep(step):
             nonlocal passed

@@ -12,6 +12,7 @@ images of each other is looked at and stands for all.
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -34,51 +35,51 @@ class CellContact(Contact):
 
     def __init__(self, problem: MixedField, walls: CellWalls, penalty: WallPenalty | None):
         self.problem, gaps = problem, walls.gaps if penalty else []
-        pairs = [pair for gap in gaps for pair in (gap, gap[::-1])]
-        if pairs:
-            pairs = pairs[: 2 * len(problem.segment.sides) // len(problem.turns)]
-            self.law = penalty.on(problem.segment.material.mu, problem.segment.gap)
-        images = [wall.images.ravel() for gap in gaps for wall in gap]
-        #: (m,) the walls' nodes, each in the images in which it is there: rotation and node in one number
-        self._images = np.unique(np.concatenate([*images, np.zeros(0, int)]))
+        self._law = penalty and penalty.on(problem.segment.material.mu, problem.segment.gap)
+        along = [np.mean([wall.along.mean() for wall in gap]) for gap in gaps]
+        own = [wall for gap in gaps for wall in gap]
+        images = np.concatenate([wall.images.ravel() for wall in own] or [np.zeros(0, int)])
+        stations = np.concatenate(
+            [(wall.along - along[i // 2]).ravel() for i, wall in enumerate(own)] or [[]]
+        )
+        #: (m,) the walls' nodes in the images in which they are there, rotation and node in one number
+        self._images, first = np.unique(images, return_index=True)
+        number, self._nodes = np.divmod(self._images, len(problem.nodes))
+        self._turns = problem.turns[number]
+        #: where each stands along the axis, from the middle of its gap (mm)
+        self._stations, self._standing = np.unique(stations[first].round(9), return_inverse=True)
         size = 3 * len(self._images) + 6
         super().__init__(MPI.COMM_SELF, size, slice(0, size))
-        self.gaps = len(gaps)
-        self._signs = [self._signs_of(each) for each in problem.classes]
-        self._stiffness = sp.csr_matrix((size, size))
-        self._walls = []
-        for pair in pairs:
-            middle = np.mean([wall.along.mean() for wall in pair])
+        self.gaps, self._stiffness = len(gaps), sp.csr_matrix((size, size))
+        self._signs = [self._signs_of(each, number) for each in problem.classes]
+        self._pairs = []
+        for pair in [pair for gap in gaps for pair in (gap, gap[::-1])]:
             first, second = (mean_normal(problem.nodes[wall.facets] * wall.turn) for wall in pair)
-            normal = first - second
-            sheets = [_Sheet(wall, self._places(wall), middle) for wall in pair]
-            self._walls.append((sheets, normal / np.linalg.norm(normal)))
+            facets = [np.searchsorted(self._images, wall.images) for wall in pair]
+            areas = surface.reference_areas(problem, pair[0].facets)
+            self._pairs.append((*facets, areas, (first - second) / np.linalg.norm(first - second)))
+        # rotations take the sides of gaps to each other: that many stand for all
+        self._pairs = self._pairs[: 2 * len(problem.segment.sides) // len(problem.turns)] if gaps else []
 
-    def _places(self, wall):
-        """(n, k, 3) of the nodes' displacements among those of the images."""
-        return 3 * np.searchsorted(self._images, wall.images)[..., None] + np.arange(3)
-
-    def _signs_of(self, each):
+    def _signs_of(self, each, number):
         """S, sparse (images' displacements and twist (k, e), unknowns and (e, k)), of a class of symmetry."""
-        number, node = np.divmod(self._images, len(self.problem.nodes))
-        dofs = self.problem.displacement_dofs[node]
-        signs = each.chi[number, None] * self.problem.turns[number] * each.signs[dofs]
+        dofs = self.problem.displacement_dofs[self._nodes]
+        signs = each.chi[number, None] * self._turns * each.signs[dofs]
         columns = np.append(each.reduced[dofs], each.unknowns + np.array(_ORDER))
-        values = np.append(signs, each.strains[_ORDER])
         rows = np.flatnonzero(columns >= 0)
-        entries = values[rows], (rows, columns[rows])
-        return sp.coo_matrix(entries, shape=(len(columns), each.unknowns + 6)).tocsr()
+        values = np.append(signs, each.strains[_ORDER])[rows]
+        return sp.coo_matrix((values, (rows, columns[rows])), (self._size, each.unknowns + 6)).tocsr()
 
     def sides(self) -> list[Side]:
         problem, found = self.problem, []
-        e, k = np.split(problem.strains.value, 2)
-        for number, (sheets, direction) in enumerate(self._walls):
-            positions = [sheet.positions(np.concatenate([k, e])) for sheet in sheets]
-            t = touching(
-                positions[0], sheets[0].areas, positions[1], direction, self.law, len(problem.turns) / 2
-            )
+        y = problem.nodes[self._nodes] * [0, 1, 1] + problem.displacement()[self._nodes]
+        screw = _Screw(problem.strains.value, self._stations, self._standing, y * self._turns)
+        x = screw.positions
+        for number, (own, other, areas, direction) in enumerate(self._pairs):
+            t = touching(x[own], areas, x[other], direction, self._law, len(problem.turns) / 2)
             if t is not None:
-                found.append(_Side(problem, number, self.law, t, sheets, positions, self._size))
+                nodes = np.concatenate([own[t.facet], other[t.other]], axis=1)
+                found.append(_Side(number, self._law, t, nodes, screw, x[other]))
         return found
 
     def residual(self) -> np.ndarray:
@@ -89,7 +90,7 @@ class CellContact(Contact):
         return self.tangent_of(0)
 
     def tangent_of(self, number: int) -> sp.csr_matrix:
-        """Sparse (unknowns + 6,) * 2 of a class of symmetry, at the state of the last tangent."""
+        """Sparse (unknowns + 6, unknowns + 6) of a class of symmetry, at the state of the last tangent."""
         signs = self._signs[number]
         return (signs.T @ self._stiffness @ signs).tocsr()
 
@@ -99,8 +100,8 @@ class CellContact(Contact):
     def forces(self) -> np.ndarray:
         # of the rotations those that keep a gap; they exchange its walls with the direction of the axis
         kept = self.problem.turns[self.problem.turns[:, 2] > 0]
-        share = kept / len(self.problem.turns)
-        return super().forces() * (share * kept[:, :1]).sum(axis=0)
+        share = kept * kept[:, :1] / len(self.problem.turns)
+        return super().forces() * share.sum(axis=0)
 
     def measure(self, pressure: float) -> WallContact:
         """WallContact at the last residual of the gap with the largest force, `pressure` (MPa) being that of
@@ -111,7 +112,7 @@ class CellContact(Contact):
             t, gap = side.touching, side.number // 2
             pushing = t.pressure > IN_CONTACT * pressure
             if pushing.any():
-                d = distances_from(side.positions[1], t.position[pushing])
+                d = distances_from(side.wall, t.position[pushing])
                 c = gaps[gap]
                 gaps[gap] = WallContact(
                     0.0,
@@ -123,69 +124,64 @@ class CellContact(Contact):
         return replace(gaps[forces.argmax()], force=float(forces.max()))
 
 
-class _Sheet:
-    """A wall: places (n, k, 3) of its nodes' displacements among the images', s (n, k) their distances from
-    the middle of the gap along the axis (mm), areas (n, p) of its Gauss points in mm2."""
+class _Screw:
+    """Where the strains (e, k) take points of local positions y (m, 3), mm, that stand along the axis at
+    stations[standing]."""
 
-    def __init__(self, wall, places, middle):
-        self._wall, self.places, self.s = wall, places, wall.along - middle
-        self.areas = surface.reference_areas(wall.problem, wall.facets)
-        self._stations, self._inverse = np.unique(self.s.round(9), return_inverse=True)
+    def __init__(self, strains, stations, standing, y):
+        e, k = np.split(strains, 2)
+        self._stations, self._standing = stations, standing
+        self._jacobian = LeftJacobian(stations[:, None] * np.concatenate([k, e]))
+        pose = self._jacobian.pose[standing]
+        self._rotation = pose[:, :3, :3]
+        self.positions = np.einsum("nij,nj->ni", self._rotation, y) + pose[:, :3, 3]
 
-    def positions(self, twist):
-        """(n, k, 3) where the nodes are now, seen from the middle of the gap."""
-        pose = LeftJacobian(self._stations[:, None] * twist).pose[self._inverse.reshape(self.s.shape)]
-        return np.einsum("...ij,...j->...i", pose[..., :3, :3], self._wall.local()) + pose[..., :3, 3]
+    @cached_property
+    def _rates(self):
+        """(m, 6, 6): twists by the strains' twist (k, e)."""
+        return (self._stations[:, None, None] * self._jacobian.matrix)[self._standing]
+
+    @cached_property
+    def _by_twist(self):
+        """(m, 3, 6): dx by the strains' twist."""
+        x = self.positions[..., None]
+        return np.cross(self._rates[:, :3], x, axisa=1, axisb=1, axisc=1) + self._rates[:, 3:]
+
+    @cached_property
+    def chain(self) -> sp.csr_matrix:
+        """Sparse (3 m, 3 m + 6): dx by the local positions and the strains' twist."""
+        m = len(self.positions)
+        turned = sp.bsr_matrix((self._rotation, np.arange(m), np.arange(m + 1)), shape=(3 * m, 3 * m))
+        return sp.hstack([turned, self._by_twist.reshape(3 * m, 6)]).tocsr()
+
+    def bend(self, f: np.ndarray) -> sp.csr_matrix:
+        """Sparse (3 m + 6, 3 m + 6): second derivatives of f . x for forces f (m, 3) that stand still."""
+        spin, D = self._rates[:, :3], self._by_twist
+        # the local frame turns under the force: d(R^T f) = R^T (f x spin)
+        turned = np.cross(f[..., None], spin, axisa=1, axisb=1, axisc=1)
+        coupling = sp.csr_matrix(np.einsum("nji,njs->nis", self._rotation, turned).reshape(-1, 6))
+        wrench = np.zeros((len(self._stations), 6))
+        np.add.at(wrench, self._standing, np.hstack([np.cross(self.positions, f), f]))
+        own = (self._stations[:, None, None] ** 2 * self._jacobian.slope(wrench)).sum(axis=0)
+        by_place = np.cross(D, f[..., None], axisa=1, axisb=1, axisc=1)  # d(x x f)
+        own += np.einsum("nis,nit->st", spin, by_place)
+        return sp.bmat([[None, coupling], [coupling.T, own]], format="csr")
 
 
 class _Side(Side):
-    """Its columns (n, 3 k + 6) are the displacements of the images of k nodes, and behind all of them the
-    strains' twist (k, e)."""
+    """By the images' displacements and, behind all of them, the strains' twist (k, e). nodes (pairs, k): of
+    `screw`; wall (n, k, 3): the one that it pushes at, mm."""
 
-    def __init__(self, problem, number, law, t, sheets, positions, size):
-        own, other = sheets
-        self.s = np.concatenate([own.s[t.facet], other.s[t.other]], axis=1)
-        self.x = np.concatenate([positions[0][t.facet], positions[1][t.other]], axis=1)
-        columns = np.concatenate([own.places[t.facet], other.places[t.other]], axis=1)
-        strains = np.broadcast_to(np.arange(size - 6, size), (len(self.s), 6))
-        super().__init__(number, law, t, np.hstack([columns.reshape(len(self.s), -1), strains]), size)
-        self.positions = positions
-        e, k = np.split(problem.strains.value, 2)
-        self._jacobian = LeftJacobian(self.s.reshape(-1, 1) * np.concatenate([k, e]))
-        #: twists (n, k, 6, 6) by the strains' twist (k, e)
-        self._rates = self.s[..., None, None] * self._jacobian.matrix.reshape(*self.s.shape, 6, 6)
-        self.rotation = self._jacobian.pose[:, :3, :3].reshape(*self.s.shape, 3, 3)
+    def __init__(self, number, law, t, nodes, screw, wall):
+        columns = 3 * nodes[..., None] + np.arange(3)
+        super().__init__(number, law, t, columns.reshape(len(nodes), -1), screw.positions.size)
+        self._screw, self.wall = screw, wall
 
-    def _motion(self):
-        """(n, k, 3, 6): dx by the strains (k, e)."""
-        spin, shift = self._rates[..., :3, :], self._rates[..., 3:, :]
-        return np.cross(spin, self.x[..., None], axisa=-2, axisb=-2, axisc=-2) + shift
+    def rows(self, values: np.ndarray, places: np.ndarray, count: int) -> sp.csr_matrix:
+        return super().rows(values, places, count) @ self._screw.chain
 
-    def chained(self, by_position: np.ndarray) -> np.ndarray:
-        local = np.einsum("...ji,...j->...i", self.rotation, by_position).reshape(len(by_position), -1)
-        return np.hstack([local, np.einsum("cnis,cni->cs", self._motion(), by_position)])
-
-    def bend(self) -> np.ndarray:
-        t, D = self.touching, self._motion()
-        pairs, k = self.s.shape
-        f, H = t.forces, -t.push[:, None, None] * t.bend
-        HD = (H @ D.reshape(pairs, 3 * k, 6)).reshape(pairs, k, 3, 6)
-        H = H.reshape(pairs, k, 3, k, 3)
-        local = np.einsum("caji,cajbk,cbkl->caibl", self.rotation, H, self.rotation, optimize=True).reshape(
-            pairs, 3 * k, 3 * k
-        )
-        # the wall turns under a force that stands still: d(R^T f) = R^T (f x spin)
-        turned = np.cross(f[..., None], self._rates[..., :3, :], axisa=-2, axisb=-2, axisc=-2)
-        coupling = np.einsum("caji,cajs->cais", self.rotation, HD + turned).reshape(pairs, 3 * k, 6)
-        own = np.einsum("cais,cait->cst", D, HD)
-        wrench = np.concatenate([np.cross(self.x, f), f], axis=-1)
-        own += np.einsum(
-            "ca,cast->cst",
-            self.s**2,
-            self._jacobian.slope(wrench.reshape(-1, 6)).reshape(*self.s.shape, 6, 6),
-        )
-        by_place = np.cross(D, f[..., None], axisa=-2, axisb=-2, axisc=-2)  # d(x x f)
-        own += np.einsum("cais,cait->cst", self._rates[..., :3, :], by_place)
-        return np.concatenate(
-            [np.concatenate([local, coupling], 2), np.concatenate([np.swapaxes(coupling, 1, 2), own], 2)], 1
-        )
+    def tangent(self) -> sp.csr_matrix:
+        nodes = self._columns.reshape(-1, 3) // 3
+        forces = np.zeros_like(self._screw.positions)
+        np.add.at(forces, nodes[:, 0], self.touching.forces.reshape(-1, 3))
+        return super().tangent() + self._screw.bend(forces)

@@ -82,8 +82,9 @@ class Touching:
     Per point (n,): overlap (mm), area (mm2, undeformed, with the share of this side), energy (N/mm), pressure
     (MPa), slope (MPa/mm); position, normal (n, 3): the point (mm) and the covector m; name (n, 2): facet of
     this wall and Gauss point on it. Per pair (c,): point, facet of this wall, other of the other wall; what
-    it adds to a point's derivatives by the k nodes of both: gradient (c, k, 3) to dG, turn (c, k, 3) to dW /
-    W in 1/mm, bend (c, 3 k, 3 k) to d2G in 1/mm, but for -(dG dW + dW dG) / W, which couples pairs.
+    it adds to a point's derivatives by the k nodes of both: gradient (c, k, 3) to dG; turn (c, k, 3) to dW /
+    W in 1/mm; bend and shift (c, 2, k, 3), whose products, bend_a shift_a + shift_a bend_a over a, add up to
+    d2G but for -(dG dW + dW dG) / W, which couples pairs.
     """
 
     overlap: np.ndarray
@@ -99,6 +100,7 @@ class Touching:
     gradient: np.ndarray
     turn: np.ndarray
     bend: np.ndarray
+    shift: np.ndarray
     name: np.ndarray
 
     @property
@@ -203,8 +205,8 @@ def _blend(kind: FacetKind, xi):
 
 
 def _derivatives(weights, m, dN, tangents, curved, plane, part, by_xi, by_xi_xi, beyond):
-    """(gradient, turn, bend) of Touching. curved (c, 2, 2, 3): X,ab; part, by_xi, by_xi_xi: w / W and the
-    derivatives of w by xi, over W; beyond (c,) mm: g - G.
+    """(gradient, turn, bend, shift) of Touching. curved (c, 2, 2, 3): X,ab; part, by_xi, by_xi_xi: w / W and
+    the derivatives of w by xi, over W; beyond (c,) mm: g - G.
 
     Both g and xi follow from X staying over the point: dg = m . (dX - dx), dxi_a = l_a . (dX - dx), and each
     second derivative is its covector's product with X,ab dxi_a dxi_b + 2 N,a dX dxi_a.
@@ -220,8 +222,8 @@ def _derivatives(weights, m, dN, tangents, curved, plane, part, by_xi, by_xi_xi,
     by_dxi = by_xi[:, :, None] * by_gap[:, None, :]
     by_dxi[:, :, own:] += np.einsum("can,ci->cani", dN, covector).reshape(n, 2, 3 * k - own)
     curved = np.einsum("cabi,ci->cab", curved, covector) + beyond[:, None, None] * by_xi_xi
-    half = np.einsum("cax,cay->cxy", by_dxi + curved @ dxi / 2, dxi)
-    return gradient.reshape(n, k, 3), turn.reshape(n, k, 3), half + np.swapaxes(half, 1, 2)
+    bend = by_dxi + curved @ dxi / 2
+    return tuple(a.reshape(*a.shape[:-1], k, 3) for a in (gradient, turn, bend, dxi))
 
 
 def _under(kind: FacetKind, points, facets):

@@ -55,6 +55,29 @@ def test_the_grid_depends_smoothly_on_the_angle(name, angle):
     assert np.abs(grids[0].points - grids[1].points).max() < 1e-6
 
 
+@pytest.mark.parametrize("name", KINDS)
+def test_a_grid_like_another_segment_s_has_its_elements_between_its_own_planes(name):
+    like = CASES[name](45.0, 1)
+    other = replace(
+        like, angle=75.0, width=1.4 * like.width, wall=1.3 * like.wall, roof=0.8 * like.roof, gap=2.9
+    )
+    grids = [cell_grid(s, 2.0, 0.25, part=True, like=like) for s in (like, other)]
+    assert (grids[0].kinds == grids[1].kinds).all()
+    assert (grids[0].points == cell_grid(like, 2.0, 0.25, part=True).points).all()
+    mesh = grids[1].mesh(air=True)
+    air = mesh.cell_tags == tags.AIR
+    of_whole = [(4 if name == "twist_w12" else 2) * mesh.volumes()[a].sum() for a in (~air, air)]
+    assert of_whole == pytest.approx(cell_volumes(other), rel=1e-12)
+
+
+def test_planes_that_are_one_here_and_two_there_leave_no_flat_elements():
+    like = replace(CASES["twist_w12"](45.0, 1), cavity_floor=0.6)
+    flush = replace(like, cavity_floor=like.channel_height / 2)
+    mesh = cell_grid(flush, 2.0, part=True, like=like).mesh(air=True)
+    assert mesh.volumes().min() > 1e-3
+    assert 4 * mesh.volumes().sum() == pytest.approx(sum(cell_volumes(flush)), rel=1e-12)
+
+
 def matched(points, others):
     """Whether two sets of points are one."""
     a, b = (np.unique(p.round(9) + 0.0, axis=0) for p in (points, others))

@@ -2,7 +2,7 @@
 tests/pneunet/test_campaign.py."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -131,21 +131,43 @@ def test_shape_numbers_do_not_change_with_size():
     )[SHAPE.index("wall")] == pytest.approx(1)
 
 
-@pytest.mark.parametrize(("gap", "part"), [(1.0, True), (0.1, False)])
-def test_a_case_on_a_grid_takes_half_a_cell_until_walls_touch(gap, part, tmp_path):
+@pytest.mark.parametrize(
+    ("gap", "apart", "touch"), [(1.0, False, False), (0.1, False, True), (0.1, True, False)]
+)
+def test_a_case_on_a_grid_takes_half_a_cell_and_may_end_where_walls_touch(gap, apart, touch, tmp_path):
     segment = replace(CASES["one_sided_w10"](60.0, 1), gap=gap, material=NeoHookean(1.0))
     inputs = {
         "segment": segment_table(segment),
         "material": material_to_table(segment.material),
-        "mesh": {"mesh_size_mm": 6.0, "element": "hexahedra"},
+        "mesh": {"mesh_size_mm": 6.0, "element": "hexahedra", "alike": True},
         **{"levels": 2, "top_pressure": 0.05, "limit_share": 0.8, "prescribed": [], "slopes": False},
-        **{"stiffness_slopes": False, "apart": False},
+        **{"stiffness_slopes": False, "apart": apart},
     }
     facts = solve_campaign_case(inputs, tmp_path)
     last = json.loads((tmp_path / "states.json").read_text())[-1]
-    assert facts["mesh"]["part"] == part and (facts["first_touch"] is None) == part
-    assert last["pressure"] == pytest.approx(0.05) and last["unstable"] == 0
-    assert (last["contact_force"] > 0) != part
+    assert facts["mesh"]["part"] and (facts["first_touch"] is not None) == touch
+    assert last["pressure"] == pytest.approx(facts["top_pressure"]) and last["unstable"] == 0
+    assert (facts["top_pressure"] < 0.05) == apart and facts["limit_pressure"] is None
+    assert (last["contact_force"] > 0) == touch and last["wall_distance"] > 0
+
+
+def test_prescribed_states_are_of_the_whole_cell_and_start_from_the_part_s(tmp_path):
+    segment = replace(CASES["one_sided_w10"](60.0, 1), material=NeoHookean(1.0))
+    prescribed = [asdict(p) for p in prescribed_states(ONE_SIDED, 1, 2, 1)[0]]
+    inputs = {
+        "segment": segment_table(segment),
+        "material": material_to_table(segment.material),
+        "mesh": {"mesh_size_mm": 6.0, "element": "hexahedra"},
+        **{"levels": 2, "top_pressure": 0.05, "limit_share": 0.8, "prescribed": prescribed},
+        **{"slopes": False, "stiffness_slopes": False, "apart": False},
+    }
+    assert solve_campaign_case(inputs, tmp_path)["missing"] == []
+    free, twofold, other = json.loads((tmp_path / "states.json").read_text())[-3:]
+    assert twofold["strains"][2] == 0 and np.abs(twofold["forces"]).max() > 0.01
+    K, change = np.array(free["stiffness"]), np.array(other["strains"]) - free["strains"]
+    assert other["strains"][2] and other["pressure"] == free["pressure"]
+    # not far from the free state the forces are those of its stiffness
+    assert np.linalg.norm(K @ change - other["forces"]) < 0.3 * np.linalg.norm(other["forces"])
 
 
 def test_prescribed_strains_take_the_energy_they_are_told():

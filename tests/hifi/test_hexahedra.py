@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from dolfinx.mesh import CellType
 from mpi4py import MPI
+from scipy.spatial import cKDTree
 
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
@@ -18,6 +19,7 @@ from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.slopes import StateSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+from pneunet.hifi.cell.unfolding import unfolding
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.fem import surface
 from pneunet.hifi.path.control import LoadControl
@@ -76,18 +78,56 @@ def test_a_part_of_the_cell_and_half_turns_are_the_cell(name, copies, tmp_path):
     assert not np.any(zero)
 
 
+def as_whole(part, whole):
+    """State array (dofs,) of a whole cell that the part's makes by its half turns."""
+    out = np.zeros_like(whole.array)
+    pressures = (problem.pressure_space.tabulate_dof_coordinates() for problem in (part, whole))
+    for (own, other), values, dofs, signs in (
+        ((part.nodes, whole.nodes), part.displacement(), whole.displacement_dofs, part.turns),
+        (pressures, part.pressure_field()[:, None], whole.pressure_dofs[:, None], np.ones((4, 1))),
+    ):
+        shifts = part.segment.pitch * np.array([-1, 0, 1])[:, None, None] * [1, 0, 0]
+        places = np.concatenate([own * turn + shifts for turn in part.turns], axis=1).reshape(-1, 3)
+        images = np.concatenate([values * sign for sign, _ in zip(signs, part.turns)])
+        distance, nearest = cKDTree(places).query(other)
+        assert distance.max() < 1e-6
+        out[dofs] = np.tile(images, (3, 1))[nearest]
+    return out
+
+
 @pytest.mark.parametrize(("name", "pressure"), [("one_sided_w10", 0.03), ("twist_w15", 0.01)])
-def test_in_a_part_of_the_cell_walls_touch_as_in_the_cell(name, pressure, tmp_path):
-    """The whole gap's walls are images of the part's; perturbations without the symmetry feel them too."""
+def test_walls_of_a_part_of_the_cell_touch_as_those_of_the_cell(name, pressure, tmp_path):
+    """The whole gap's walls are images of the part's; perturbations without the symmetry feel them too. The
+    part's equilibrium is one of the whole."""
     segment = replace(CASES[name](60.0, 1), gap=0.1, material=NeoHookean(1.0))
-    states, energies = [], []
-    for part in (True, False):
-        problem = touching(segment, tmp_path, part)
-        states.append(solved(problem, pressure))
-        energies.append(problem.stored_energy())
-    assert states[0].contact.force > 0.01 and not states[0].walls_overlap
-    agree(*states, 1e-7)
-    assert energies[0] == pytest.approx(energies[1], rel=1e-9)
+    part, whole = (touching(segment, tmp_path, each) for each in (True, False))
+    state, system = solved(part, pressure), CellSystem(whole)
+    assert state.contact.force > 0.01 and not state.walls_overlap
+    x = system.state.copy()
+    kept = whole.reduced >= 0
+    x[whole.reduced[kept]] = as_whole(part, whole)[kept]
+    x[-6:] = state.strains.vector
+    system.state, system.load = x, pressure
+    residual, scale = system.residual()
+    assert np.linalg.norm(residual) < 2 * RELATIVE_TOLERANCE * scale
+    agree(state, system.measure(), 1e-8)
+    assert part.stored_energy() == pytest.approx(whole.stored_energy(), rel=1e-9)
+    system.destroy()
+
+
+@pytest.mark.parametrize("name", ["one_sided_w10", "twist_w15"])
+def test_a_part_s_state_unfolded_is_an_equilibrium_of_the_cell(name, tmp_path):
+    segment = replace(CASES[name](60.0, 1), gap=0.1, material=NeoHookean(1.0))
+    part, whole = (touching(segment, tmp_path, p) for p in (True, False))
+    systems = [CellSystem(problem) for problem in (part, whole)]
+    path = EquilibriumPath(systems[0], LoadControl(), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE))
+    run_steps(path, 0.01, StepSize(first=0.005, smallest=1e-4))
+    systems[1].load, systems[1].state = 0.01, unfolding(part, whole)(systems[0].state)
+    residuals = [np.linalg.norm(system.residual()[0]) for system in systems]
+    assert residuals[1] < 2 * residuals[0] + 1e-10
+    assert whole.contact.energy() == pytest.approx(part.contact.energy(), rel=1e-8)
+    for system in systems:
+        system.destroy()
 
 
 def test_all_classes_count_unstable_directions(tmp_path):

@@ -1,11 +1,13 @@
-"""Derivatives of free states by the shape, against states of cells whose mesh was moved and solved again."""
+"""Derivatives of free states by the shape, against states of cells whose mesh was moved and solved again; and
+by how the material stiffens, against those of cells of stiffer materials."""
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pneunet.base.materials.laws import NeoHookean
+from pneunet.base.materials.laws import NeoHookean, Yeoh, unchecked
 from pneunet.geometry.cad.cell import mesh_cell
+from pneunet.geometry.cad.grid import grid_cell
 from pneunet.geometry.grids.morph import Morph
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import DIRECTIONS, changed
@@ -60,4 +62,22 @@ def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_pa
         row = list(DIRECTIONS[segment.kind]).index(direction)
         for slope, plus, minus in zip((strains[row], stiffness[row]), *ends):
             difference = (plus - minus) / (2 * step)
+            assert slope == pytest.approx(difference, rel=0.02, abs=0.02 * np.abs(difference).max())
+
+
+def test_those_by_the_stiffening_are_differences_of_states_of_other_materials(tmp_path):
+    ends, step = [], 0.01
+    for c20, c30 in ((0.05, 0.0), (0.05 + step, 0.0), (0.05 - step, 0.0), (0.05, step), (0.05, -step)):
+        material = unchecked(Yeoh, **vars(Yeoh(c10=0.1)) | {"c20": c20 * 0.1, "c30": c30 * 0.1})
+        segment = CASES["one_sided_w10"](angle=60.0, chambers=1, material=material)
+        grid_cell(segment, 6.0, tmp_path / "cell.npz", part=True)
+        problem = CellProblem(segment, tmp_path / "cell.npz")
+        system, state = solved(problem, 0.03)
+        ends.append(numbers(state))
+        if len(ends) == 1:
+            slopes = Slopes(problem).of(system)
+        system.destroy()
+    for row, (plus, minus) in zip((-2, -1), (ends[1:3], ends[3:])):
+        for slope, a, b in zip((s[row] for s in slopes), plus, minus):
+            difference = (a - b) / (2 * step)
             assert slope == pytest.approx(difference, rel=0.02, abs=0.02 * np.abs(difference).max())
