@@ -66,6 +66,7 @@ PARTS = {
     ),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "grids": (grids.made, "grids of 10,000 random segments and 500 random manipulators; some 4 minutes"),
+    "cad-grids": (grids.described_by_cad, "CAD of the demo, reference cases, 40 random ones; some 6 minutes"),
     "cell-grids": (grids.cells, "cells of both kinds on grids of hexahedra: errors, cost; some 10 minutes"),
     "body-grids": (grids.bodies, "the tip of a body at rest on grids and tetrahedra; some 3 minutes"),
     "segments": (
