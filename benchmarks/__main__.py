@@ -82,6 +82,7 @@ PARTS = {
     ),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "grids": (grids.made, "grids of 10,000 random segments and 500 random manipulators; some 4 minutes"),
+    "cad-grids": (grids.described_by_cad, "CAD of the demo, reference cases, 40 random ones; some 6 minutes"),
     "cell-grids": (
         cell_grids.cells,
         "cells of both kinds on grids of hexahedra, and with contact: errors, orders, cost; some 30 minutes",
