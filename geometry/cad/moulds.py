@@ -14,7 +14,7 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.system.progress import progress
+from pneunet.base.progress import progress
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad import mould_solids as solids
 from pneunet.geometry.cad.meshing import TRIANGLE, write_model
