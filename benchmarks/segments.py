@@ -137,8 +137,8 @@ def section(details):
     lines = [
         "",
         (
-            f"Strains at a mesh of {STRAIN_MESH:g} mm ({details['dofs']} dofs in the segment), where the"
-            " middle is two pitches:"
+            f"Strains on the same grid of hexahedra of {STRAIN_MESH:g} mm ({details['dofs']} dofs in the"
+            " segment), where the middle is two pitches:"
         ),
         "",
     ]
