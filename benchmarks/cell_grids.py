@@ -42,7 +42,8 @@ def sweep(case, path):
     seconds = time.process_time() - started
     at = {round(s.pressure, 6): s for s in states}
     strains = [vector(at[p].strains.vector, case.segment.pitch) for p in PRESSURES]
-    return row(seconds, strains, facts, stiffness=True)
+    stretches = [at[p].largest_stretch for p in PRESSURES]
+    return row(seconds, strains, facts, stiffness=True) | {"largest_stretch": stretches}
 
 
 def row(seconds, strains, facts, stiffness):
@@ -65,7 +66,7 @@ def free_path(case, path):
     from pneunet.hifi.path.stepping import StepSize, run_steps
 
     started, seen = time.process_time(), {}
-    facts = mesh_of(case, path, part=case.element == "hexahedra")
+    facts = mesh_of(case, path)
     system = CellSystem(CellProblem(case.segment, path))
     options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
     run_steps(
@@ -168,11 +169,16 @@ def cells():
         seconds = [{mesh: row["cpu_seconds"] for mesh, row in each["meshes"].items()} for each in studies]
         return max(each[f"default{of}"] / each[f"tetrahedra{of}"] for each in seconds)
 
+    def stretch_change(each):
+        default, fine = (np.array(each["meshes"][m]["largest_stretch"]) for m in ("default", each["fine"]))
+        return np.abs(fine / default - 1).max()
+
     return {
         "cell_grid_error_rel": worst("default"),
         "cell_fine_grid_error_rel": worst("fine"),
         "cell_finest_grid_error_rel": worst("finest"),
         "cell_tetrahedra_error_rel": worst("tetrahedra"),
+        "stretch_mesh_rel": float(max(stretch_change(each) for each in studies)),
         "cell_grid_order": float(np.min([each["orders"] for each in studies])),
         "cell_contact_grid_error_rel": touching["auto"]["error_rel"][CONTACT_SIZES.index(DEFAULT)],
         "cell_default_vs_tets_ratio": ratio(""),

@@ -87,7 +87,9 @@ class CellData:
     volume: np.ndarray = column("states", (), "f4", "of the air per length")
     energy: np.ndarray = column("states", (), "f4", "stored, per length")
     unstable: np.ndarray = column("states", (), "i1", "unstable directions, free strains included")
-    largest_stretch: np.ndarray = column("states", (), "f4", "largest principal stretch in the solid")
+    largest_stretch: np.ndarray = column(
+        "states", (), "f4", "largest principal stretch, mean over the most stretched hundredth"
+    )
     residual: np.ndarray = column("states", (), "f4", "norm over mu pitch^2")
     wall_distance: np.ndarray = column(
         "states", (), "f4", "smallest of neighbouring chambers over l; nan: not measured", gaps=True

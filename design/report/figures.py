@@ -106,7 +106,8 @@ def body_pictures(run: DesignFolder, scene: Scene, folder: Path) -> list[tuple[s
             caption += f"; the scale ends at the {percentile}th percentile" * bool(beyond)
             if field == MEAN_STRETCH:
                 inside = significant(solve.steps["largest_stretch"][-1], 3)
-                caption += f". Inside an element it is at most {inside} (largest_stretch in steps.csv)"
+                caption += f". Over the most stretched hundredth of a segment it is {inside} on average"
+                caption += " (largest_stretch in steps.csv)"
             coloured, look = rendering.coloured(surface, field, limits, MAP)
             picture(
                 name,

@@ -116,7 +116,8 @@ class ManipulatorSolve:
             self.problem.contact = BodyContact(self.problem, self.walls, laws)
         #: what the accepted states have met
         self.watch = TouchWatch(self.problem.contact.gaps > 0)
-        self.stretch = PrincipalStretch(self.problem)
+        solids = [(tags.BODY + i, tags.LAYER + i) for i in range(len(manipulator.segments))]
+        self.stretch = PrincipalStretch(self.problem, solids)
         #: hifi.path.stepping.Step of the last accepted state
         self.last_step = None
         #: called between iterations (hifi.path.newton)
