@@ -69,8 +69,8 @@ def finite(folder, chambers, mesh_size):
 
 
 def cell_as_a_body(folder):
-    """{pressure: ((e (3,), k (3,)), the cell's own)} of a cell at STRAIN_MESH between frames that are fitted as
-    a body's are: to the deformed channel's wall, over a pitch around each.
+    """{pressure: ((e (3,), k (3,)), the cell's own)} of a cell at STRAIN_MESH between frames that are fitted
+    as a body's are: to the deformed channel's wall, over a pitch around each.
 
     The cell's own strains are those of its gauge, which is fitted to the wall in coordinates that turn with
     the section. On a wall that is bent by an angle a pitch the two lines lie apart, and stretches differ by
