@@ -167,9 +167,8 @@ def test_a_page_is_run_in_its_order(tmp_path):
 )
 def test_a_page_that_says_otherwise_fails_with_its_line(tmp_path, right, wrong):
     text = PAGE.replace(right, wrong)
-    line = next(
-        block.line for block in blocks(text) if wrong in text.splitlines()[block.line - 2] + block.text
-    )
+    above = text.splitlines()
+    line = next(block.line for block in blocks(text) if wrong in above[block.line - 2] + block.text)
     with pytest.raises(WrongBlock, match=f"line {line}"):
         run_page(text, tmp_path)
 

@@ -67,10 +67,8 @@ def command_fault(words: list[str], alone: bool = True) -> str:
         script = next((word for word in words[1:] if not word.startswith("-")), None)
         return "" if script and (ROOT / script).is_file() else f"there is no {script}"
     if program in LAUNCHERS:
-        rest = next(
-            (n for n, word in enumerate(words) if n and Path(word).name in ("pneunet", "python")), None
-        )
-        return command_fault(words[rest:]) if rest else f"nothing of pneunet's is started by {program}"
+        n = next((n for n, word in enumerate(words) if n and Path(word).name in ("pneunet", "python")), 0)
+        return command_fault(words[n:]) if n else f"nothing of pneunet's is started by {program}"
     return f"nobody here knows {program}" if alone else ""
 
 

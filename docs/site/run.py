@@ -1,9 +1,10 @@
 """`python -m docs.site.run [PAGE ...]`: runs the blocks of pages, in their order, in a sandbox a page.
 
-A sandbox looks like the repository, with an `out` of its own: blocks find what earlier ones of their page have
-left, and a page that begins with <!-- after: other.md --> what that page has left in `out`. A block with a title is a file there. Blocks of Python share their names. A block that ends
-otherwise than it says, or does not say what it is said to, fails the page with its file and line.
-`out/pages/commands.json` counts what was run.
+A sandbox looks like the repository, with an `out` of its own: blocks find what earlier ones of their page
+have left, and a page that begins with <!-- after: other.md --> what that page has left in `out`. A block with
+a title is a file there. Blocks of Python share their names. A block that ends otherwise than it says, or does
+not say what it is said to, fails the page with its file and line. `out/pages/commands.json` counts what was
+run.
 """
 
 import argparse
