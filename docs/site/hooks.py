@@ -26,6 +26,8 @@ from tests.typecheck import as_installed  # noqa: E402
 #: page of the repository's front -> its name in the site
 FRONT = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 LINK = re.compile(r"(\]\()([^)\s#]+)((?:#[^)\s]*)?\))")
+#: a link that is called by its page's file, as it is read in the repository
+NAMED = re.compile(r"\[([\w-]+\.md)\]\(")
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\s*\\[(\[](.*?)\\[)\]]\s*</\1>', re.S)
 
 
@@ -47,11 +49,20 @@ def on_files(files: Files, config):
 
 
 def on_page_markdown(markdown, page, config, files):
-    return markdown if page.file.src_uri in FRONT.values() else _links(markdown, "docs")
+    titles = dict(_titles(config.nav))
+    markdown = markdown if page.file.src_uri in FRONT.values() else _links(markdown, "docs")
+    return NAMED.sub(lambda match: f"[{titles.get(match[1], match[1])}](", markdown)
 
 
 def on_page_content(content, page, config, files):
     return FORMULA.sub(_mathml, content)
+
+
+def _titles(entries):
+    """(page, title) of the navigation."""
+    for entry in entries:
+        for title, inside in entry.items():
+            yield from [(inside, title)] if isinstance(inside, str) else _titles(inside)
 
 
 def _links(text: str, folder: str) -> str:
