@@ -24,6 +24,7 @@ test: setup ## all tests; those of the finite elements again on 2 ranks
 docs: setup ## run the commands of all pages and build their site, out/docs/index.html
 	$(VENV)/python -m docs.site.run -j $(RANKS)
 	NO_MKDOCS_2_WARNING=1 $(VENV)/mkdocs build --quiet
+	$(VENV)/python -m docs.site.look
 
 types: setup ## mypy and ruff
 	$(VENV)/ruff check . && $(VENV)/ruff format --check .

@@ -19,5 +19,6 @@ def docs():
     start = time.perf_counter()
     subprocess.run([sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict"], cwd=ROOT, check=True)
     seconds = time.perf_counter() - start
+    subprocess.run([sys.executable, "-m", "docs.site.look"], cwd=ROOT, check=True)
     executed = counts["total"]["commands"] + counts["total"]["python"]
     return {"docs_build_seconds": seconds, "docs_commands_executed": executed}, counts

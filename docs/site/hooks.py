@@ -38,7 +38,7 @@ def on_config(config):
 
 def on_files(files: Files, config):
     for name, page in FRONT.items():
-        text = _links((ROOT / name).read_text(), "")
+        text = _links((ROOT / name).read_text(), "", page)
         files.append(File.generated(config, page, content=text))
     for file in list(files.documentation_pages()):
         text = (ROOT / "docs" / file.src_uri) if file.src_uri not in FRONT.values() else None
@@ -50,7 +50,7 @@ def on_files(files: Files, config):
 
 def on_page_markdown(markdown, page, config, files):
     titles = dict(_titles(config.nav))
-    markdown = markdown if page.file.src_uri in FRONT.values() else _links(markdown, "docs")
+    markdown = markdown if page.file.src_uri in FRONT.values() else _links(markdown, "docs", page.file.src_uri)
     return NAMED.sub(lambda match: f"[{titles.get(match[1], match[1])}](", markdown)
 
 
@@ -65,18 +65,24 @@ def _titles(entries):
             yield from [(inside, title)] if isinstance(inside, str) else _titles(inside)
 
 
-def _links(text: str, folder: str) -> str:
+def _links(text: str, folder: str, page: str) -> str:
     """Links of a page in a folder of the repository, as the site has their targets: pages side by side,
-    other files under their path."""
+    other files under their path, what a page has made under its name."""
 
     def there(match):
         target = match[2]
-        if "://" in target or target.startswith((MADE, "mailto:")):
+        if "://" in target:
             return match[0]
+        if target.startswith(MADE):
+            return match[1] + _made(page, target) + match[3]
         path = posixpath.normpath(posixpath.join(folder, target))
         return match[1] + FRONT.get(path, path.removeprefix("docs/")) + match[3]
 
     return LINK.sub(there, text)
+
+
+def _made(page: str, target: str) -> str:
+    return posixpath.join(MADE, Path(page).stem, target.removeprefix(MADE))
 
 
 def _bring(files: Files, config, page: str, target: str) -> None:
@@ -85,8 +91,9 @@ def _bring(files: Files, config, page: str, target: str) -> None:
         return
     if target.startswith(MADE):
         source = OUT / Path(page).stem / target.removeprefix(MADE)
+        target = _made(page, target)
         if not source.is_file():
-            log.warning(f"{page}: its commands have not made {target}: python -m docs.site.run docs/{page}")
+            log.warning(f"{page}: its commands have not made {source.name}: python -m docs.site.run docs/{page}")
     else:
         target = posixpath.normpath(posixpath.join("docs", target)) if target.startswith("../") else target
         source = ROOT / target
