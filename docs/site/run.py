@@ -31,8 +31,8 @@ MADE = "made/"
 #: what a sandbox has of its own
 OWN = {"out", ".git"}
 AFTER = re.compile(r"<!-- after: (\S+\.md) -->\n")
-#: seconds that a block may take; longer ones are marked
-PATIENCE = 900
+#: seconds after which a block is taken to hang, on a machine that others use, too
+PATIENCE = 3600
 
 
 class WrongBlock(Exception):
@@ -105,15 +105,15 @@ def _environment() -> dict[str, str]:
 
 
 def _shell(block: Block, folder: Path) -> tuple[str, int]:
+    line = ["timeout", str(PATIENCE), "bash", "-euo", "pipefail", "-c", block.text]
     done = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", block.text],
+        line,
         cwd=folder,
         env=_environment(),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=PATIENCE,
     )
     return done.stdout, done.returncode
 
