@@ -50,7 +50,8 @@ def on_files(files: Files, config):
 
 def on_page_markdown(markdown, page, config, files):
     titles = dict(_titles(config.nav))
-    markdown = markdown if page.file.src_uri in FRONT.values() else _links(markdown, "docs", page.file.src_uri)
+    name = page.file.src_uri
+    markdown = markdown if name in FRONT.values() else _links(markdown, "docs", name)
     return NAMED.sub(lambda match: f"[{titles.get(match[1], match[1])}](", markdown)
 
 
@@ -93,7 +94,8 @@ def _bring(files: Files, config, page: str, target: str) -> None:
         source = OUT / Path(page).stem / target.removeprefix(MADE)
         target = _made(page, target)
         if not source.is_file():
-            log.warning(f"{page}: its commands have not made {source.name}: python -m docs.site.run docs/{page}")
+            why = f"{source.name} is not made: python -m docs.site.run docs/{page}"
+            log.warning(f"{page}: {why}")
     else:
         target = posixpath.normpath(posixpath.join("docs", target)) if target.startswith("../") else target
         source = ROOT / target
