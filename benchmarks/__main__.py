@@ -21,6 +21,7 @@ from benchmarks import (
     contact,
     contact_page,
     design,
+    docs,
     door,
     doubt,
     grids,
@@ -76,6 +77,7 @@ PARTS = {
         door.door,
         "1500 generated bad inputs at every door of the command line: one line each; some 5 minutes",
     ),
+    "docs": (docs.docs, "the commands of all pages, and the build of their site; some 10 minutes"),
     "house": (
         house.house,
         "lines of Python, time of the import, type errors, the wheel's test; 3 minutes",
