@@ -7,7 +7,7 @@ RANKS := 2
 export OMP_NUM_THREADS := 1
 export HWLOC_HIDE_ERRORS := 2
 
-.PHONY: help setup demo test types bench silicones idea image image-test clean
+.PHONY: help setup demo test docs types bench silicones idea image image-test clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
@@ -20,6 +20,11 @@ demo: setup ## target curve -> design -> CAD -> finite elements -> report
 test: setup ## all tests; those of the finite elements again on 2 ranks
 	$(VENV)/python -m pytest -n $(RANKS) --dist loadfile
 	$(VENV)/pneunet run -n $(RANKS) -- python -m pytest -q -p no:cacheprovider tests/hifi tests/verification
+
+docs: setup ## run the commands of all pages and build their site, out/docs/index.html
+	$(VENV)/python -m docs.site.run -j $(RANKS)
+	NO_MKDOCS_2_WARNING=1 $(VENV)/mkdocs build --quiet
+	$(VENV)/python -m docs.site.look
 
 types: setup ## mypy and ruff
 	$(VENV)/ruff check . && $(VENV)/ruff format --check .

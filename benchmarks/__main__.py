@@ -21,6 +21,7 @@ from benchmarks import (
     contact,
     contact_page,
     design,
+    docs,
     door,
     doubt,
     grids,
@@ -75,12 +76,14 @@ PARTS = {
         door.door,
         "1500 generated bad inputs at every door of the command line: one line each; some 5 minutes",
     ),
+    "docs": (docs.docs, "the commands of all pages, and the build of their site; some 10 minutes"),
     "house": (
         house.house,
         "lines of Python, time of the import, type errors, the wheel's test; 3 minutes",
     ),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "grids": (grids.made, "grids of 10,000 random segments and 500 random manipulators; some 4 minutes"),
+    "cad-grids": (grids.described_by_cad, "CAD of the demo, reference cases, 40 random ones; some 6 minutes"),
     "cell-grids": (
         cell_grids.cells,
         "cells of both kinds on grids of hexahedra, and with contact: errors, orders, cost; some 30 minutes",

@@ -3,6 +3,7 @@
 from benchmarks.strange_files import Random, pick
 
 GOOD_LINES = (
+    ("init", "target"),
     ("design", "target.toml", "--law", "trained", "--outside", "warn"),
     ("shape", "design.toml", "--pressure-kPa", "5,10", "--law", "trained"),
     ("mesh", "design.toml", "--mesh-size-mm", "3"),

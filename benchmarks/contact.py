@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-SIZE, FINER = 2.0, 1.5
+SIZE, FINER, ELEMENT = 2.0, 1.5, "hexahedra"
 TOP = 0.05
 #: pressures (MPa) at which the third medium is asked for the force between chambers
 CHECKED = (0.01, 0.03, 0.05)
@@ -38,7 +38,7 @@ def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, **case):
     path, states, touches = Path(folder) / f"{time.monotonic_ns()}.npz", [], []
     started = time.process_time()
     solve_cell(
-        CellCase(body, pressure, size, levels, contact=contact, **case),
+        CellCase(body, pressure, size, levels, contact=contact, element=ELEMENT, **case),
         path,
         states.append,
         on_touch=touches.append,
@@ -169,7 +169,7 @@ def limit(values):
 def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSES):
     """[[kPa, force (N) and twist (rad/m) at each of the softnesses]] of the third medium; ConvergenceError
     where it finds no state."""
-    from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.geometry.cad.grid import grid_cell
     from pneunet.hifi.cell.problem import CellProblem
     from pneunet.hifi.cell.run import CONTACT_PATIENCE
     from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
@@ -179,7 +179,7 @@ def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSE
     from pneunet.hifi.path.newton import NewtonOptions
     from pneunet.hifi.path.stepping import StepSize, run_steps
 
-    mesh_cell(body, size, path, gaps=True)
+    grid_cell(body, size, path, gaps=True, part=True)
     followed = ThirdMedium()
     problem = CellProblem(body, path, medium=followed)
     system, energy = CellSystem(problem), problem.medium

@@ -1,9 +1,9 @@
-"""The finite segment of the part `contact`: five pairs of chambers of twist-w15 to 50 kPa, on as many ranks
-as it is started on.
+"""The finite segment of the part `contact`: five pairs of chambers of twist-w15 to 50 kPa, with contact and
+without, on as many ranks as it is started on.
 
     pneunet run -n 2 -- python -m benchmarks.contact_segment FOLDER
 writes FOLDER/segment.json: the twist of the middle pitch and the forces between walls, at the pressures of
-`LEVELS`.
+`LEVELS`, and what it took.
 """
 
 import json
@@ -13,12 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.contact import ELEMENT, SIZE
+
 ROOT = Path(__file__).resolve().parent.parent
-CHAMBERS, SIZE, RANKS = 5, 2.0, 2
+CHAMBERS, RANKS = 5, 2
 LEVELS = (0.01, 0.02, 0.03, 0.04, 0.05)
 
 
 def run(folder):
+    import time
+
     from mpi4py import MPI
 
     from pneunet.base import se3
@@ -33,30 +37,35 @@ def run(folder):
 
     segment = CASES["twist_w15"](angle=60.0, chambers=CHAMBERS, material=NeoHookean(0.317))
     comm, body = MPI.COMM_WORLD, Manipulator((segment,))
-    on_rank_0(comm, lambda: mesh_manipulator(body, SIZE, folder) and None)
-    solve = ManipulatorSolve(body, folder / "manipulator.npz", contact=WallPenalty())
-    pitch, stations = body.segments[0].pitch, solve.sections.stations
-    centre = solve.sections.segment_stations[0][CHAMBERS // 2]
-    ends = [int(np.argmin(abs(stations - s))) for s in (centre - pitch / 2, centre + pitch / 2)]
-    rows = []
+    on_rank_0(comm, lambda: mesh_manipulator(body, SIZE, folder, element=ELEMENT) and None)
+    rows, seconds = [], []
 
     def note(m):
+        stations = solve.sections.stations
+        centre, pitch = solve.sections.segment_stations[0][CHAMBERS // 2], segment.pitch
+        ends = [int(np.argmin(abs(stations - s))) for s in (centre - pitch / 2, centre + pitch / 2)]
         relative = se3.inverse_pose(m.frames[ends[:1]]) @ m.frames[ends[1:]]
         strains = RodStrains.from_relative_pose(relative, np.diff(stations[ends]))
         forces = np.linalg.norm(solve.problem.contact.forces(), axis=1)
         twist = strains.k[0, 0] / strains.e[0, 0] * 1e3
         rows.append({"pressure_kPa": m.pressure * 1e3, "twist_rad_per_m": twist, "forces_N": forces.tolist()})
 
-    solve.run(LEVELS[-1], note, milestones=LEVELS[:-1], stability=False)
+    for contact, seen in ((None, lambda m: None), (WallPenalty(), note)):
+        solve = ManipulatorSolve(body, folder / "manipulator.npz", contact=contact)
+        started = time.process_time()
+        solve.run(LEVELS[-1], seen, milestones=LEVELS[:-1], stability=False)
+        seconds.append(comm.allreduce(time.process_time() - started))
+        dofs = solve.problem.dofs
+        solve.destroy()
     kept = [r for r in rows if any(abs(r["pressure_kPa"] - 1e3 * p) < 1e-6 for p in LEVELS)]
     facts = {
         "ranks": comm.size,
-        "dofs": solve.problem.dofs,
+        "dofs": dofs,
+        "cpu_seconds_without_and_with": seconds,
         "mesh_size_mm": SIZE,
         "chambers": CHAMBERS,
         "levels": kept,
     }
-    solve.destroy()
     on_rank_0(comm, lambda: (folder / "segment.json").write_text(json.dumps(facts)) and None)
 
 
@@ -81,7 +90,12 @@ def beside_cell(twists, folder):
     worst = max(
         abs(level["twist_rad_per_m"] / level["cell_twist_rad_per_m"] - 1) for level in facts["levels"]
     )
-    return {"contact_segment_vs_cell_rel": worst}, facts
+    without, with_contact = facts["cpu_seconds_without_and_with"]
+    figures = {
+        "contact_segment_vs_cell_rel": worst,
+        "contact_segment_cost_factor": with_contact / without,
+    }
+    return figures, facts
 
 
 if __name__ == "__main__":

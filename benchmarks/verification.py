@@ -93,7 +93,7 @@ def ladder(element):
             manufactured.orders(*errors[-2:]),
         )
     )
-    orders["Cook's membrane: rise"] = float(np.log2((rises[1] - rises[0]) / (rises[2] - rises[1])))
+    orders["Cook's membrane: rise"] = float(np.log2(abs(np.divide(*np.diff(rises)))))
     for key, rows in coarse.items():
         for before, after in zip(rows, exact[key]):
             orders[f"{after.case}: {after.quantity}"] = float(

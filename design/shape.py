@@ -16,7 +16,7 @@ from pneunet.base.files.schemas import SHAPES
 from pneunet.base.pictures.painting import paint, show_scale_and_axes, write_text_on
 from pneunet.base.pictures.rendering import view_of
 from pneunet.base.pictures.vtp import write_quads
-from pneunet.base.system.progress import progress
+from pneunet.base.progress import progress
 from pneunet.base.units import in_MPa
 from pneunet.design.design import Design
 from pneunet.design.report.labels import kPa, plain, rgb, segment_colour

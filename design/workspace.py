@@ -23,9 +23,9 @@ from pneunet.base.files.record import write_record
 from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, material_from_table
 from pneunet.base.pictures import rendering
+from pneunet.base.progress import progress
 from pneunet.base.quantities import Checked, quantities, quantity, shown
 from pneunet.base.strains import RodStrains
-from pneunet.base.system.progress import progress
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, PER_MM_PER_M
 from pneunet.design.design import chosen_law
 from pneunet.design.search.space import START

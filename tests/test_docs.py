@@ -6,8 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from docs.site.blocks import blocks, pages
+from docs.site.check import faults
+from docs.site.run import MADE, WrongBlock, run_page
+
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = pages()
 FOLDERS = "base|geometry|hifi|reduced|design|pneunet|containers|tests|benchmarks|examples|docs"
 #: not inside of another word or path, nor a table of a TOML file
 FREE = r"(?<![\w/.\[-])"
@@ -78,7 +82,7 @@ def test_what_a_page_names_exists(page):
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "CHANGELOG.md"], ids=name)
 def test_links_lead_somewhere(page):
     for link in LINK.findall(page.read_text()):
-        if "://" not in link:
+        if "://" not in link and not link.startswith(MADE):  # what a page's commands make, the build asks for
             path, _, anchor = link.partition("#")
             target = page.parent / path if path else page
             assert target.exists(), link
@@ -94,3 +98,83 @@ def test_python_of_a_page_parses_and_imports_what_exists(page):
                 assert first == "pneunet" or first not in FOLDERS.split("|"), node.module
                 if first == "pneunet":
                     assert [a.name for a in node.names if not exists(f"{node.module}.{a.name}")] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_commands_of_a_page_could_be_run(page):
+    assert faults(page.read_text()) == []
+
+
+@pytest.mark.parametrize(
+    "text, fault",
+    [
+        ("<!-- long: days -->\n```sh\npneunet shape a.toml --pressure-MPa 1\n```\n", "--pressure-MPa"),
+        ("<!-- long: days -->\n```sh\nmpirun -n 3 pneunet studdy a.toml\n```\n", "studdy"),
+        ("<!-- long: days -->\n```sh\nmake bench && make nothing\n```\n", "nothing"),
+        ("<!-- long: days -->\n```sh\npython -m benchmarks --only house --no-such\n```\n", "--no-such"),
+        ("<!-- long: days -->\n```sh\nfrobnicate a.toml\n```\n", "frobnicate"),
+        ("run `pneunet solve --resum` then", "--resum"),
+        ("<!-- soon -->\n```sh\nls\n```\n", "remark"),
+        ("```\nls\n```\n", "a block of ''"),
+        ("    pneunet doctor\n", "indented"),
+    ],
+)
+def test_a_command_that_could_not_be_run_is_named(text, fault):
+    assert [line for line in faults(text) if fault in line]
+
+
+PAGE = """
+```csv title="a.csv"
+1,2
+```
+
+```sh
+cat a.csv > out.csv   # a comment
+echo "read $(wc -l < a.csv) row"
+```
+
+```text
+read ... row
+```
+
+```python
+rows = len(open("out.csv").readlines())
+```
+
+```python
+assert rows == 1
+```
+
+<!-- exits 3 -->
+```sh
+exit 3
+```
+
+<!-- long: for ever -->
+```sh
+sleep 1e9
+```
+"""
+
+
+def test_a_page_is_run_in_its_order(tmp_path):
+    assert run_page(PAGE, tmp_path) == {"commands": 3, "python": 2, "files": 1, "long": 1}
+    assert (tmp_path / "out.csv").read_text() == "1,2\n"
+
+
+@pytest.mark.parametrize(
+    "right, wrong", [("exits 3", "exits 2"), ("read ... row", "read 7 rows"), ("rows == 1", "rows == 2")]
+)
+def test_a_page_that_says_otherwise_fails_with_its_line(tmp_path, right, wrong):
+    text = PAGE.replace(right, wrong)
+    above = text.splitlines()
+    line = next(block.line for block in blocks(text) if wrong in above[block.line - 2] + block.text)
+    with pytest.raises(WrongBlock, match=f"line {line}"):
+        run_page(text, tmp_path)
+
+
+def test_the_reference_has_every_name_of_the_front_door():
+    import pneunet
+
+    named = re.findall(r"^::: pneunet\.([\w.]+)$", (ROOT / "docs" / "api.md").read_text(), re.M)
+    assert sorted(named) == sorted(f"{place}.{name}" for name, place in pneunet._PLACES.items())

@@ -12,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[1]
 CHECKED = ("base", "geometry", "reduced", "design", "pneunet")
 
 
-def mypy(folders=CHECKED):
-    """The finished process of mypy on the folders."""
+def as_installed():
+    """The folder under which the packages hang as in the wheel, by links: made anew."""
     top = ROOT / "out" / "types" / "pneunet"
     top.mkdir(parents=True, exist_ok=True)
     wanted = {path.name: path for path in (ROOT / "pneunet").iterdir() if path.suffix in (".py", ".typed")}
@@ -22,6 +22,12 @@ def mypy(folders=CHECKED):
         link.unlink()
     for name, path in wanted.items():
         (top / name).symlink_to(path)
+    return top
+
+
+def mypy(folders=CHECKED):
+    """The finished process of mypy on the folders."""
+    top = as_installed()
     names = [f"pneunet.{name}" for name in folders if name != "pneunet"]
     if "pneunet" in folders:
         names += [

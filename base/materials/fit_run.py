@@ -15,7 +15,7 @@ from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
 from pneunet.base.materials.laws import LAWS, Hyperelastic, material_to_table
 from pneunet.base.materials.tensile import Specimen, read_tensile
-from pneunet.base.system.progress import progress
+from pneunet.base.progress import progress
 from pneunet.base.units import KPA_PER_MPA
 
 log = logging.getLogger(__name__)

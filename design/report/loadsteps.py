@@ -10,7 +10,7 @@ import numpy as np
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.pictures.walls import FIELD
-from pneunet.base.system.progress import progress
+from pneunet.base.progress import progress
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report.bodies import listed_steps, read_step
 from pneunet.design.report.labels import plain

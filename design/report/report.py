@@ -11,8 +11,8 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import revision
+from pneunet.base.progress import Pace
 from pneunet.base.system.libraries import load_vtk
-from pneunet.base.system.progress import Pace
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report import figures
 from pneunet.design.report.bodies import Scene, read_solution

@@ -11,7 +11,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import atomic_path
 from pneunet.base.pictures.painting import write_text_on
 from pneunet.base.pictures.rendering import PIXELS, render, view_of
-from pneunet.base.system.progress import progress
+from pneunet.base.progress import progress
 from pneunet.design.report.labels import TARGET, segment_colour
 from pneunet.design.report.loadsteps import FIELDS, LoadSteps
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.materials.laws import of_modulus
-from pneunet.base.system.progress import Pace, progress
+from pneunet.base.progress import Pace, progress
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.groups import divided

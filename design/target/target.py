@@ -56,16 +56,15 @@ class SplitOptions(Checked):
 class Target:
     """points (n, 3) in mm from base to tip, and optionally
 
-    frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height); weights (n,)
-    >= 0: how much each point counts (None: alike; all 0: the curve is a guide, and only `tip` and `shapes`
-    count); pieces: the split; base_direction, base_width (3,): unit vectors that hold the base (width None =
-    its roll stays free, both None = it is free to turn); gravity (3,): acceleration in mm/s2, in the target's
-    coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of several groups of
-    segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip: `TipPoints` as the
-    pressure rises; material; casting: what can be cast; groups: how many pressures
-    there are, where pieces do not say; start: {field of Segment: mm}; vary: {field of
-    Segment: (low, high)} or None for the default choice; split: how it is split; source: name of the file
-    that it was read from.
+    frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height);
+    weights (n,) >= 0: how much each point counts (None: alike; all 0: the curve is a guide, and only `tip`
+    and `shapes` count); pieces: the split; base_direction, base_width (3,): unit vectors that hold the base
+    (width None = its roll stays free, both None = it is free to turn); gravity (3,): acceleration in mm/s2,
+    in the target's coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of
+    several groups of segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip:
+    `TipPoints` as the pressure rises; material; casting: what can be cast; groups: how many pressures there
+    are, where pieces do not say; start: {field of Segment: mm}; vary: {field of Segment: (low, high)} or None
+    for the default choice; split: how it is split; source: name of the file that it was read from.
     """
 
     points: np.ndarray

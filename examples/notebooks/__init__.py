@@ -5,7 +5,7 @@ from pathlib import Path
 NOTEBOOKS = tuple(sorted(Path(__file__).parent.glob("*.ipynb")))
 
 
-def execute(path: Path, folder: Path, seconds: float = 600.0):
+def execute(path: Path, folder: Path, seconds: int = 600):
     """The executed notebook, in a kernel of this Python and a working directory of its own.
 
     nbclient's CellExecutionError where a cell fails.

@@ -15,10 +15,10 @@ from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad.polyhedra import bar_solid, lofted, polyhedron
 from pneunet.geometry.ends import Bar, placed
 from pneunet.geometry.fillets import rounding
-from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.moulds.layers import Run
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.snapping import snapped
 
 #: chords of a quarter of a rounded edge
 CHORDS = 4
@@ -183,7 +183,8 @@ def void(run: Run, plane: float, top: float, below: float, moulds: Moulds) -> li
         def heights(roof):
             return z0, top if np.isfinite(top) else max(roof, plane)
 
-        tags.extend(_channel(p, plane, heights, lambda z: moulds.slope * (z - plane)))
+        pairs = _channel(p, plane, heights, lambda z: moulds.slope * (z - plane))
+        tags.extend(lofted(pair) for pair in pairs if pair[:, 2, 2].max() > plane + 1e-9)
         for side in p.sides:
             low, high = sorted((side * s.cavity_floor, side * s.cavity_top))
             if low > plane + 1e-9 or min(high, top) < plane + 1e-9:
@@ -209,41 +210,31 @@ def void(run: Run, plane: float, top: float, below: float, moulds: Moulds) -> li
 
 
 def _channel(p, plane, heights, inset):
-    """Volume tags of a channel between each two sections: from and to heights(roof), inset(z) narrower;
-    where it is lower than 1e-9 mm above `plane` there is none."""
-    bar, tags = p.channel.cut_at(plane), []
-    rings = []
+    """Rings (2, 4, 3) of the channel's pieces along x, each above `plane` or below it: from and to
+    heights(roof), inset(z) narrower."""
+    bar, rings = p.channel.cut_at(plane), []
     for x, ((y0, y1), (_, roof)) in zip(bar.x, bar.sections):
         low, high = heights(roof)
         a, b = inset(low), inset(high)
-        rings.append(np.array([[x, y0 + a, low], [x, y1 - a, low], [x, y1 - b, high], [x, y0 + b, high]]))
+        rings.append([[x, y0 + a, low], [x, y1 - a, low], [x, y1 - b, high], [x, y0 + b, high]])
+    places = np.array(rings)
     for i, lean in zip((0, -1), p.leans):
-        rings[i][:, 0] += lean * rings[i][:, 1]
-    for a, b in zip(rings, rings[1:]):
-        if max(a[2, 2], b[2, 2]) > plane + 1e-9:
-            tags.append(lofted(np.array([a, b])))
-    return tags
+        places[i, :, 0] += lean * places[i, :, 1]
+    return np.stack([places[:-1], places[1:]], axis=1)
 
 
-def teeth(run: Run, plane: float, moulds: Moulds) -> list[int]:
-    """Volume tags of what the layer above `plane` has below it (geometry.moulds.layers.Run.depth), from above
-    the plane on; as much narrower as the core that leaves room for it."""
+def teeth(run: Run, plane: float, moulds: Moulds) -> list[tuple[int, int]]:
+    """What the layer above `plane` has below it (geometry.moulds.layers.Run.depth), from above the plane on;
+    as much narrower as the core that leaves room for it."""
     spread = run.planes[-1] - run.planes[0]
-    tags = []
-    for p in run.parts:
-        bar = p.channel.cut_at(plane)
-        for i in np.flatnonzero(np.diff(bar.x) > 0):
-            part = Bar(bar.x[i : i + 2], bar.sections[i : i + 2])
-            if part.sections[:, 1, 1].min() > plane - 1e-9:
-                continue
-            rings = []
-            for x, ((y0, y1), (_, roof)) in zip(part.x, part.sections):
-                a, b = (moulds.slope * (plane - z + spread) for z in (roof, plane + 1))
-                rings.append(
-                    [[x, y0 + a, roof], [x, y1 - a, roof], [x, y1 - b, plane + 1], [x, y0 + b, plane + 1]]
-                )
-            tags.append(lofted(np.array(rings)))
-    return tags
+    pairs = [
+        pair
+        for p in run.parts
+        for pair in _channel(
+            p, plane, lambda roof: (roof, plane + 1), lambda z: moulds.slope * (plane - z + spread)
+        )
+    ]
+    return [(3, lofted(pair)) for pair in pairs if pair[:, 0, 2].min() < plane - 1e-9]
 
 
 def tray(piece: MouldPiece, plane: float, top: float) -> int:
@@ -286,7 +277,7 @@ def plate_with_cores(piece: MouldPiece, plane: float) -> int:
         for x, y, diameter in vents(piece.run, m.vent)
         if piece.start + m.vent < x < piece.stop - m.vent
     ]
-    return _without(tag, holes + [(3, t) for t in teeth(piece.run, plane, m)])
+    return _without(tag, holes + teeth(piece.run, plane, m))
 
 
 def vents(run: Run, diameter: float) -> list[tuple[float, float, float]]:

@@ -14,7 +14,7 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.system.progress import progress
+from pneunet.base.progress import progress
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad import mould_solids as solids
 from pneunet.geometry.cad.meshing import TRIANGLE, write_model
@@ -89,18 +89,14 @@ def solid(build: Callable[[], int], shift: np.ndarray, over: bool, step: Path | 
 
 
 def _triangles(volume):
+    """(points, triangles) of the mesh on a volume's surface, outward."""
+    gmsh.model.mesh.setOutwardOrientation(volume)  # signs of faces mean another thing in each version
+    faces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
+    corners = np.concatenate([gmsh.model.mesh.getElementsByType(TRIANGLE, tag)[1] for tag in faces])
     numbers, points, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(numbers)
-    rows = []
-    for _, face in gmsh.model.getBoundary([(3, volume)], oriented=True):
-        found = gmsh.model.mesh.getElementsByType(TRIANGLE, abs(face))[1].reshape(-1, 3)
-        rows.append(found if face > 0 else found[:, ::-1])
-    triangles = np.searchsorted(numbers[order], np.concatenate(rows))
-    used, triangles = np.unique(triangles, return_inverse=True)
-    points, triangles = points.reshape(-1, 3)[order][used], triangles.reshape(-1, 3)
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    inside_out = np.einsum("ij,ij->", a, np.cross(b, c)) < 0
-    return points, triangles[:, ::-1] if inside_out else triangles
+    used, triangles = np.unique(np.searchsorted(numbers[order], corners), return_inverse=True)
+    return points.reshape(-1, 3)[order][used], triangles.reshape(-1, 3)
 
 
 def body_part(

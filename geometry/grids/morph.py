@@ -1,13 +1,13 @@
 """A cell's grid carried over to a cell of other dimensions: the mesh of the one becomes a mesh of the other.
 
 All faces of a cell are planes across X3, across X2 or across xi = X1 less the chambers' lean
-(geometry.grids.planes). Maps that are piecewise linear in each of these coordinates take the planes of one
+(geometry.ends). Maps that are piecewise linear in each of these coordinates take the planes of one
 cell to those of another, and its grid to the other's.
 """
 
 import numpy as np
 
-from pneunet.geometry.grids.planes import lean
+from pneunet.geometry.ends import lean
 from pneunet.geometry.parameters import TWISTING, Segment
 
 

@@ -65,8 +65,6 @@ class CellProblem(MixedField):
         contact: WallPenalty | None = None,
     ):
         part = not isinstance(mesh, tuple) and bool(read_mesh(mesh)[1].get("part"))
-        if part and medium:
-            raise ValueError("a medium needs the whole cell")
         super().__init__(*(mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, MPI.COMM_SELF)))
         self.segment, self._gauge_of, self._penalty = segment, (gauge, centre), contact
         #: (g, 3) diagonals of the rotations that make the cell of the mesh
@@ -163,7 +161,7 @@ class CellProblem(MixedField):
             second = ufl.as_tensor(
                 ufl.grad(ufl.grad(u))[a, b, c] + ky[a, c] * E1[b] + kF[a, b] * E1[c], (a, b, c)
             )
-            terms.append(Term(self.medium.density(F, second, mu), self.cells(tags.GAP)))
+            terms.append(Term(whole * self.medium.density(F, second, mu), self.cells(tags.GAP)))
         self._potential = PotentialEnergy(self, terms)
         t = ufl.TestFunction(compat.cell_vectors(self.mesh, 6))
         slopes = [(ufl.diff(term.density, q), term.measure) for term in terms]
@@ -237,9 +235,10 @@ class CellProblem(MixedField):
         return mixed, curvature
 
     def medium_forces(self) -> np.ndarray:
-        """(nodes, 3) forces (N) with which the medium pushes at the nodes, in the rotating frame of their
-        X1."""
-        return -self.vector(self._potential.residuals[-1:])[self.displacement_dofs]
+        """(nodes, 3) forces (N) with which the mesh's medium pushes at the nodes, in the rotating frame of
+        their X1."""
+        forces = -self.vector(self._potential.residuals[-1:])[self.displacement_dofs]
+        return forces / len(self.turns)
 
     def measure_contact(self) -> WallContact | None:
         """That of the gap with the largest force, at the last residual; None without contact."""

@@ -51,7 +51,7 @@ def _has_half_turns(case):
     """Whether a part of the case's cell will do."""
     turns = group(case.segment.kind)
     alike = strains_of(characters(turns)[0], turns)[list(case.held)].all()
-    return case.element == "hexahedra" and case.contact != "third-medium" and bool(alike)
+    return case.element == "hexahedra" and bool(alike)
 
 
 def mesh_of(case: CellCase, path: str | Path) -> dict:

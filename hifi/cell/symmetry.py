@@ -215,15 +215,21 @@ class BorderedPattern:
         )
         self._border = np.concatenate([border.data, border.data, np.zeros(len(corner))])
         rows = np.concatenate([rows[self._keep], i, j, corner])
-        self._known = self._key(rows, np.concatenate([columns[self._keep], j, i, corner]))
-        self._arrange(self._known)
+        known = self._key(rows, np.concatenate([columns[self._keep], j, i, corner]))
+        self._keys, self._place = np.unique(known, return_inverse=True)
+        self._index()
 
     def _key(self, rows, columns):
         return rows * np.int64(self._size) + columns
 
-    def _arrange(self, key):
-        self._keys = np.unique(key)
-        self._place = np.searchsorted(self._keys, self._known)
+    def _grow(self, keys):
+        """Put new `keys`, each once and in their order, between those that are there."""
+        at = np.searchsorted(self._keys, keys)
+        self._place += np.cumsum(np.bincount(at, minlength=len(self._keys)))[self._place]
+        self._keys = np.insert(self._keys, at, keys)
+        self._index()
+
+    def _index(self):
         self._indices = (self._keys % self._size).astype(np.int32)
         self._indptr = np.searchsorted(self._keys, self._size * np.arange(self._size + 1)).astype(np.int32)
 
@@ -237,8 +243,9 @@ class BorderedPattern:
         """
         key = self._key(np.asarray(rows, np.int64), np.asarray(columns, np.int64))
         place = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        if (self._keys[place] != key).any():
-            self._arrange(np.concatenate([self._keys, key]))
+        new = self._keys[place] != key
+        if new.any():
+            self._grow(np.unique(key[new]))
             place = np.searchsorted(self._keys, key)
         entries = np.concatenate([data[self._keep] * self._signs, self._border, values])
         summed = np.bincount(np.concatenate([self._place, place]), entries, len(self._keys))

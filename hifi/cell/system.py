@@ -292,21 +292,19 @@ class _Factor:
     """The factorised matrix of a class of symmetry; what its pattern has cost is kept."""
 
     def __init__(self):
-        self._pattern = self._values = self._matrix = self._solver = None
+        self._arrays = self._matrix = self._solver = None
 
     def of(self, matrix):
         """DirectSolver that has factorised a symmetric CSR matrix, of the same `indices` while its pattern is
         the same."""
-        if self._pattern is matrix.indices:
-            self._values[:] = matrix.data
+        if self._arrays and self._arrays[1] is matrix.indices:
+            self._arrays[2][:] = matrix.data
             self._matrix.stateIncrease()
         else:
             self.release()
-            self._pattern, self._values = matrix.indices, matrix.data
-            # which looks at these arrays instead of copies of them
-            self._matrix = PETSc.Mat().createAIJWithArrays(
-                matrix.shape, (matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
-            )
+            # at which PETSc's matrix looks; it copies nothing
+            self._arrays = matrix.indptr, matrix.indices, matrix.data
+            self._matrix = PETSc.Mat().createAIJWithArrays(matrix.shape, self._arrays, comm=MPI.COMM_SELF)
             self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self._solver = DirectSolver(self._matrix, MPI.COMM_SELF)
         self._solver.factorise()

@@ -180,8 +180,8 @@ class _Side(Side):
     def rows(self, values: np.ndarray, places: np.ndarray, count: int) -> sp.csr_matrix:
         return super().rows(values, places, count) @ self._screw.chain
 
+    def forces(self) -> np.ndarray:
+        return self._screw.chain.T @ super().forces()
+
     def tangent(self) -> sp.csr_matrix:
-        nodes = self._columns.reshape(-1, 3) // 3
-        forces = np.zeros_like(self._screw.positions)
-        np.add.at(forces, nodes[:, 0], self.touching.forces.reshape(-1, 3))
-        return super().tangent() + self._screw.bend(forces)
+        return super().tangent() + self._screw.bend(super().forces().reshape(-1, 3))

@@ -46,9 +46,10 @@ class Side:
         at = np.broadcast_to(places[:, None], self._kept.shape)[self._kept], self._columns[self._kept]
         return sp.coo_matrix((values, at), shape=(count, self._size)).tocsr()
 
-    def forces(self) -> sp.csr_matrix:
-        """Sparse (size, 1): first derivatives of the energy."""
-        return self.rows(self.touching.forces, np.zeros(len(self._columns), int), 1).T.tocsr()
+    def forces(self) -> np.ndarray:
+        """(size,) first derivatives of the energy."""
+        values = self.touching.forces.reshape(self._columns.shape)[self._kept]
+        return np.bincount(self._columns[self._kept], values, self._size)
 
     @cached_property
     def gap_gradients(self) -> sp.csr_matrix:
@@ -89,13 +90,6 @@ class Contact:
         """What pushes now in the gaps that this rank computes."""
         return []
 
-    def _sum(self, parts, columns):
-        """This rank's rows of the sum of all ranks' sparse matrices (size, columns)."""
-        if not self.comm.allreduce(len(parts)):
-            return sp.csr_matrix((self._owned.stop - self._owned.start, columns))
-        total = sum(parts, sp.csr_matrix((self._size, columns)))
-        return sum(self.comm.allgather(total))[self._owned]
-
     def energy(self) -> float:
         """N mm stored in overlaps."""
         touching = [side.touching for side in self.sides()]
@@ -106,12 +100,16 @@ class Contact:
         self._now = self.sides()
         deepest = self.comm.allreduce(max((side.depth for side in self._now), default=0.0), op=MPI.MAX)
         self.overreach = deepest / DEEPEST
-        return self._sum([side.forces() for side in self._now], 1).toarray()[:, 0]
+        own, total = sum((side.forces() for side in self._now), np.zeros(self._size)), np.zeros(self._size)
+        for places, values in self.comm.allgather((np.flatnonzero(own), own[own != 0])):
+            total[places] += values
+        return total[self._owned]
 
     def tangent(self) -> sp.csr_matrix:
         """Sparse (owned, size): second derivatives of the energy."""
         self._then = self.sides()
-        return self._sum([side.tangent() for side in self._then], self._size)
+        own = sum((side.tangent() for side in self._then), sp.csr_matrix((self._size, self._size)))
+        return sum(self.comm.allgather(own))[self._owned]
 
     def stiffnesses(self, factorised: bool = False) -> Stiffnesses:
         """{point: N/mm} of all ranks, at the last residual or at the last tangent."""

@@ -26,7 +26,7 @@ from pneunet.hifi.fem.facets import FacetKind, kind_of
 _CANDIDATES = 10
 _ITERATIONS = 6
 #: facets are tried where the first guess is within this of their middle, of their width
-_NEAR = 1.2
+_NEAR = 0.9
 #: half the width of the zone along an edge in which facets are blended, of a facet's height over the edge
 _BLEND = 0.05
 #: a quadratic facet stays within this part of its nodes' range beyond them
@@ -144,11 +144,11 @@ def touching(
     plane = np.linalg.svd(direction[None])[2][1:]
     position = x[facet, gauss]
     point, other, xi = _under(kind, position @ plane.T, wall @ plane.T)
-    nodes, N, dN = wall[other], kind.shape(xi), kind.slopes(xi)
-    tangents = np.einsum("can,cni->cai", dN, nodes)
+    nodes, (N, dN, ddN) = wall[other], kind.with_curvatures(xi)
+    tangents = dN @ nodes
     normal = np.cross(tangents[:, 0], tangents[:, 1])
     facing = -(normal @ direction) > _STEEPEST * np.linalg.norm(normal, axis=1)
-    gap = (np.einsum("cn,cni->ci", N, nodes) - position[point]) @ direction
+    gap = ((N[:, None] @ nodes)[:, 0] - position[point]) @ direction
     share_of, *shifts = _blend(kind, xi)
     share_of = np.where(facing, share_of, 0.0)
     total = np.bincount(point, share_of, len(facet))
@@ -158,14 +158,14 @@ def touching(
     if not len(keep):
         return None
     kept = np.flatnonzero(near)
-    point, other, xi, N, dN, tangents, nodes, normal, gap, share_of, by_xi, by_xi_xi = (
-        a[keep] for a in (point, other, xi, N, dN, tangents, nodes, normal, gap, share_of, *shifts)
+    point, other, N, dN, ddN, tangents, nodes, normal, gap, share_of, by_xi, by_xi_xi = (
+        a[keep] for a in (point, other, N, dN, ddN, tangents, nodes, normal, gap, share_of, *shifts)
     )
     m = normal / (normal @ direction)[:, None]
     weights = np.concatenate([-shape[gauss[point]], N], axis=1)
     part, by_xi, by_xi_xi = ((a.T / total[point]).T for a in (share_of, by_xi, by_xi_xi))
     beyond = gap - mean[point]
-    curved = np.einsum("cabn,cni->cabi", kind.curvatures(xi), nodes)
+    curved = ddN @ nodes[:, None]
     derivatives = _derivatives(weights, m, dN, tangents, curved, plane, part, by_xi, by_xi_xi, beyond)
     normals = np.zeros((len(facet), 3))
     np.add.at(normals, point, part[:, None] * m)
@@ -230,7 +230,8 @@ def _under(kind: FacetKind, points, facets):
     """Pairs (c,) of points (n, 2) and facets (m, nodes, 2) they lie over, or just beside: point, facet,
     coordinates xi (c, 2)."""
     count = min(_CANDIDATES, len(facets))
-    centres, slopes = kind.shape(kind.centre) @ facets, kind.slopes(kind.centre) @ facets
+    N, dN = kind.with_slopes(kind.centre)
+    centres, slopes = N @ facets, dN @ facets
     near = cKDTree(centres).query(points, k=count)[1].reshape(len(points), count)
     # by Newton, from the coordinates in the middle's tangent plane
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -239,8 +240,9 @@ def _under(kind: FacetKind, points, facets):
         other, xi = near[point, column], xi[point, column]
         nodes = facets[other]
         for _ in range(_ITERATIONS):
-            miss = points[point] - np.einsum("cn,cni->ci", kind.shape(xi), nodes)
-            xi = xi + _solve2(np.einsum("can,cni->cia", kind.slopes(xi), nodes), miss)
+            N, dN = kind.with_slopes(xi)
+            miss = points[point] - (N[:, None] @ nodes)[:, 0]
+            xi = xi + _solve2(np.swapaxes(dN @ nodes, 1, 2), miss)
         values, ways = kind.edges
         over = ((values + xi @ ways.T).min(axis=-1) > -_BLEND) & (np.abs(miss).max(axis=-1) < 1e-3)
     return point[over], other[over], xi[over]

@@ -188,18 +188,18 @@ class CellWalls:
         return max((self._contact(gap, pressure) for gap in self.gaps), key=lambda c: c.force)
 
     def _contact(self, gap, pressure):
-        (wall, other), facets = gap, gap[0].facets
+        (wall, other), kind = gap, kind_of(gap[0].facets)
         e, k = np.split(self.problem.strains.value, 2)
         s = wall.along[..., None]
         rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
-        forces = np.einsum("...ij,...j->...i", rotation, self.problem.medium_forces()[facets]).reshape(-1, 3)
-        # a node of a cut lies on both sides of it, with a share of the force on each
+        forces = self.problem.medium_forces()[wall.facets] * wall.turn
+        forces = np.einsum("...ij,...j->...i", rotation, forces).reshape(-1, 3)
+        # a node of a cut is there in several images, with a share of the force in each
         _, first, inverse = np.unique(
-            np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True
+            np.round(np.c_[wall.images.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True
         )
         forces, x = forces[first], self.positions(wall).reshape(-1, 3)[first]
-        kind = kind_of(facets)
-        shares = surface.reference_areas(self.problem, facets) @ kind.shape(kind.gauss)
+        shares = surface.reference_areas(self.problem, wall.facets) @ kind.shape(kind.gauss)
         areas = np.bincount(inverse.ravel(), shares.ravel())
         total = np.linalg.norm(forces.sum(axis=0))
         touching = (areas > _TOLERANCE) & (

@@ -24,6 +24,9 @@ with kept():
     from dolfinx.io import gmshio  # which loads gmsh
 
 OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
+#: MUMPS's ordering: METIS, which Debian 12's has not. There it is PORD, which needs a third fewer operations
+#: than AMF, its own choice below 10,000 unknowns
+ORDERING = 4 if OLD else 5
 #: sums may be reordered and pow need not set errno, so that loops over quadrature points vectorise: residuals
 #: take a third of the time, tangents 0.8 (infinities and NaN keep their meaning: they tell Newton's method
 #: that a step went too far)

@@ -91,32 +91,34 @@ class FacetKind:
 
     @cached_property
     def _coefficients(self):
-        """(monomials, nodes) of the shape functions."""
-        return np.linalg.inv((self.nodes[:, None] ** self.exponents).prod(axis=-1))
+        """(monomials, nodes), (monomials, 2, nodes) and (monomials, 2, 2, nodes) of the shape functions and
+        of their first and second derivatives."""
+        lower = self.exponents[:, None, None] == self.exponents[None, :, None] - np.eye(2, dtype=int)
+        by = np.einsum("mna,na->amn", lower.all(axis=-1), self.exponents)
+        shape = np.linalg.inv((self.nodes[:, None] ** self.exponents).prod(axis=-1))
+        slopes = np.moveaxis(by @ shape, 0, 1)
+        return shape, slopes, np.einsum("bml,lan->mabn", by, slopes)
 
-    def _polynomials(self, places, *by):
-        """(..., nodes) the shape functions' derivatives by the coordinates `by`, one after the other."""
-        exponents, factors = self.exponents.copy(), np.ones(len(self.exponents))
-        for axis in by:
-            factors *= exponents[:, axis]
-            exponents[:, axis] = np.maximum(exponents[:, axis] - 1, 0)
-        x, y = np.moveaxis(places, -1, 0)
-        x, y = (np.stack([np.ones_like(a), a, a * a], axis=-1) for a in (x, y))
-        monomials = x[..., exponents[:, 0]] * y[..., exponents[:, 1]]
-        return monomials @ (factors[:, None] * self._coefficients)
+    def _polynomials(self, places, order):
+        """The shape functions' derivatives up to an order, at places (..., 2)."""
+        powers = np.stack([np.ones_like(places), places, places * places], axis=-1)
+        i, j = self.exponents.T
+        monomials = powers[..., 0, i] * powers[..., 1, j]
+        tables = self._coefficients[: order + 1]
+        found = [monomials @ table.reshape(len(table), -1) for table in tables]
+        return [a.reshape(places.shape[:-1] + table.shape[1:]) for a, table in zip(found, tables)]
 
     def shape(self, places: np.ndarray) -> np.ndarray:
         """(..., nodes) shape functions at reference places (..., 2)."""
-        return self._polynomials(places)
+        return self._polynomials(places, 0)[0]
 
-    def slopes(self, places: np.ndarray) -> np.ndarray:
-        """(..., 2, nodes) their derivatives by the place."""
-        return np.stack([self._polynomials(places, a) for a in range(2)], axis=-2)
+    def with_slopes(self, places: np.ndarray) -> list[np.ndarray]:
+        """Shape functions, and (..., 2, nodes) their derivatives by the place."""
+        return self._polynomials(places, 1)
 
-    def curvatures(self, places: np.ndarray) -> np.ndarray:
-        """(..., 2, 2, nodes) their second derivatives by the place."""
-        rows = [np.stack([self._polynomials(places, a, b) for b in range(2)], axis=-2) for a in range(2)]
-        return np.stack(rows, axis=-3)
+    def with_curvatures(self, places: np.ndarray) -> list[np.ndarray]:
+        """The same, and (..., 2, 2, nodes) their second derivatives."""
+        return self._polynomials(places, 2)
 
     def stretched(self, places: np.ndarray, corners: np.ndarray) -> np.ndarray:
         """(..., q) area over reference area at places (q, 2) of facets with these corners (..., corners, 3),

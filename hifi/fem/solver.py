@@ -4,6 +4,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from pneunet.hifi.fem.compat import ORDERING
+
+_OPTIONS = "pneunet_"
 #: MUMPS could not allocate its workspace
 OUT_OF_MEMORY = -13
 
@@ -33,8 +36,9 @@ class DirectSolver:
         self.ksp.setOperators(self.matrix)
         pc.setFactorSetUpSolverType()
         factor = pc.getFactorMatrix()
-        # metis, where this MUMPS has it; Debian 12 takes its own choice (PORD) all the same
-        factor.setMumpsIcntl(7, 5)
+        # the ordering is taken from PETSc's options alone
+        factor.setOptionsPrefix(_OPTIONS)
+        PETSc.Options(_OPTIONS)["mat_mumps_icntl_7"] = ORDERING
         if self.symmetric:
             # ordering of the graph compressed by 2x2 pivots: 7 % fewer operations
             factor.setMumpsIcntl(12, 2)

@@ -30,9 +30,9 @@ from pneunet.base.files.atomic import temporary_beside, write_text
 from pneunet.base.files.reading import read_json
 from pneunet.base.files.record import revision
 from pneunet.base.files.toml import as_table, from_table
+from pneunet.base.progress import eta
 from pneunet.base.system.interrupts import Interrupted, deferred, is_interrupted
 from pneunet.base.system.processes import Limits, environment_without_launcher, machine_memory_MB, run_limited
-from pneunet.base.system.progress import eta
 from pneunet.hifi.fem.agreement import folder_of_all, on_rank_0
 from pneunet.hifi.runs.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
 

@@ -13,8 +13,8 @@ from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CELL
 from pneunet.base.files.toml import to_table
 from pneunet.base.materials.laws import material_to_table
+from pneunet.base.progress import Pace
 from pneunet.base.system.interrupts import Interrupted
-from pneunet.base.system.progress import Pace
 from pneunet.base.units import KPA_PER_MPA, PER_MM_PER_M
 from pneunet.hifi.cell.file import read_cell
 from pneunet.hifi.cell.problem import CellProblem

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from pneunet.base.errors import InputError
-from pneunet.base.system.progress import progress
+from pneunet.base.progress import progress
 from pneunet.reduced.trained.gaussian import GaussianProcess
 from pneunet.reduced.trained.kind_law import KindLaw
 

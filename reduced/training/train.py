@@ -15,7 +15,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.dataset import CellData, read_dataset
 from pneunet.base.files.folder import output_folder
-from pneunet.base.system.progress import Pace
+from pneunet.base.progress import Pace
 from pneunet.reduced.trained.file import read_law, write_law
 from pneunet.reduced.trained.kind_law import KindLaw
 from pneunet.reduced.trained.law import TrainedLaw

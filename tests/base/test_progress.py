@@ -2,7 +2,7 @@
 
 import pytest
 
-from pneunet.base.system import progress as told
+from pneunet.base import progress as told
 
 
 class Clock:

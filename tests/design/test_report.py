@@ -210,12 +210,19 @@ def test_a_report_of_damaged_parts_shows_the_others(tmp_path, caplog):
         read_solution(solution)
 
 
+def without_scene(page):
+    """(a report without the body to turn, that)"""
+    [scene] = re.findall(r' srcdoc="([^"]*)"', page)
+    return page.replace(scene, ""), scene
+
+
 def test_report_page_is_whole_and_self_contained(tmp_path):
     pytest.importorskip("pyvista")
     from pneunet.design.report.report import write_report
 
     make_run(tmp_path, overlap=0.13)
-    page = write_report(tmp_path).read_text()
+    page, scene = without_scene(write_report(tmp_path).read_text())
+    assert "Plotly.newPlot" in scene and len(page) + len(scene) < 15e6
     names = {p.name for p in (tmp_path / "report").iterdir()}
     assert names == {
         "curves.png",

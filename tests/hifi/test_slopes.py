@@ -75,7 +75,7 @@ def test_those_by_the_stiffening_are_differences_of_states_of_other_materials(tm
         system, state = solved(problem, 0.03)
         ends.append(numbers(state))
         if len(ends) == 1:
-            slopes = Slopes(problem).of(system)
+            slopes = StateSlopes(problem).of(system)
         system.destroy()
     for row, (plus, minus) in zip((-2, -1), (ends[1:3], ends[3:])):
         for slope, a, b in zip((s[row] for s in slopes), plus, minus):

@@ -68,7 +68,7 @@ def energy(first, second):
 
 def gradient(first, second):
     """By the nodes of both sheets, (n, 3)."""
-    return sum(side.forces().toarray().reshape(-1, 3) for side in sides(first, second))
+    return sum(side.forces().reshape(-1, 3) for side in sides(first, second))
 
 
 def moved(sheet, displacement):

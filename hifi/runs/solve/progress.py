@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterator
 
-from pneunet.base.system.progress import eta
+from pneunet.base.progress import eta
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.body.manipulator import DEAD_LOADS, ManipulatorSolve, Measured

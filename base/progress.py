@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Iterable, Iterator
+from operator import length_hint
 from typing import TypeVar
 
 #: seconds from one line to the next, and to the first: what is done before says nothing
@@ -21,7 +22,7 @@ def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iter
 
     what: 'frames of the film'; total: how many there are, by default len(items).
     """
-    count = len(items) if total is None else total  # type: ignore[arg-type]
+    count = length_hint(items) if total is None else total
     started = told = time.monotonic()
     for done, item in enumerate(items, start=1):
         yield item

@@ -1,0 +1,1 @@
+"""The pages, in Markdown; `docs.site` makes a site of them."""
