@@ -142,8 +142,8 @@ source = "technical bulletin, from memory, not compared since; mu from its 100 %
 
 def test_folders_of_finished_cases_keep_their_names(tmp_path):
     """Wherever their functions move: weeks of computing are found again."""
-    campaign = read_campaign(ROOT / "examples" / "campaigns" / "cells-v1.toml")
-    assert campaign.designs[0].case.name == "2cd907a6e41e"
+    campaign = read_campaign(ROOT / "examples" / "campaigns" / "cells-v2.toml")
+    assert campaign.designs[0].case.name == "0f7bf976e33d"
     text = (ROOT / "examples" / "studies" / "angles.toml").read_text()
     first = text.replace("pressure_kPa = 25", "pressure_kPa = 40")
     first = first.replace('silicone = "Dragon Skin 20"', FIRST_MATERIAL)
