@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+#: random manipulators whose CAD is built
+DESCRIBED = 40
 #: MPa: a pressure under which a body's answer is linear
 SMALL = 1e-5
 
@@ -41,6 +43,32 @@ def made():
         "grid_of_a_cell_ms": 1e3 * float(np.median(cells)),
         "grid_of_a_body_ms": 1e3 * float(np.median(bodies)),
     }, {"failed": failed}
+
+
+def described_by_cad():
+    """The part `cad-grids`: ({key: value}, details): volumes of body and cavity, CAD against grid."""
+    import pneunet as pn
+    from pneunet.geometry.cad import body as cad
+    from pneunet.geometry.grids.body import body_grid
+    from pneunet.geometry.grids.sample import random_manipulator
+    from pneunet.geometry.parameters import Manipulator
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.geometry.tags import AIR
+
+    random = np.random.default_rng(22)
+    demo = pn.inverse_design(pn.Target.read("examples/curves/octopus.csv")).manipulator
+    known = [Manipulator((case(angle, 3),)) for case in CASES.values() for angle in (60.0, 90.0, 120.0)]
+    parts: dict[str, list[float]] = {"cad_grid_volume_rel": [], "cad_grid_volume_random_rel": []}
+    for key, bodies in zip(parts, ([demo, *known], [random_manipulator(random) for _ in range(DESCRIBED)])):
+        for body in bodies:
+            with cad.session():
+                built = cad.build(body)
+            mesh = body_grid(body, 2.0).mesh(air=True)
+            air, each = mesh.cell_tags == AIR, mesh.volumes()
+            made = np.array([each[~air].sum(), each[air].sum()])
+            off = np.abs([built["body_mm3"], built["cavity_mm3"]] / made - 1)
+            parts[key].append(float(off.max()))
+    return {key: max(off) for key, off in parts.items()}, {"off": parts}
 
 
 def bodies(sizes=(1.5, 0.75), tetrahedra=2.0):

@@ -12,12 +12,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pneunet.geometry.grids.planes import SNAP, lean
 from pneunet.geometry.parameters import TWISTING, Segment
 from pneunet.geometry.sections import channel_section, core_section, rotation
+from pneunet.geometry.snapping import SNAP
 
 #: mm: sections that differ by less are one
 _SAME = 1e-9
+
+
+def lean(segment: Segment, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """s(z) cot(angle) y, mm, of places in the segment's own axes: how far x lies beyond xi."""
+    s = segment
+    if not s.sides:
+        return np.zeros(np.broadcast(y, z).shape)
+    fraction = np.clip(z / s.cavity_floor, -1, 1) if s.kind == TWISTING else np.ones_like(z)
+    return fraction * s.cot * y
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ FLOORS = {
 #: rooms of a package from the ground up: a room's modules may import those of its own storey and below; "" is
 #: what lies in the package itself
 ROOMS = {
-    "base": [{""}, {"files"}, {"materials", "system", "pictures"}],
+    "base": [{""}, {"files"}, {"system", "pictures"}, {"materials"}],
     "geometry": [{""}, {"grids", "moulds"}, {"cad"}],
     "hifi": [
         {"fem"},
@@ -54,7 +54,7 @@ NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
 BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
-BLOCKED |= {"trimesh", "manifold3d", "plotly"}
+BLOCKED |= {"trimesh", "manifold3d", "plotly", "shtab"}
 BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:

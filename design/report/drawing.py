@@ -39,6 +39,7 @@ def segment_table(manipulator: Manipulator) -> list[tuple[str, list[str]]]:
         ),
         row("its material", lambda s: s.layer_material.name if s.layer_thickness else "-", True),
     ]
+    fillets = [row("fillet of chambers' edges", lambda s: plain(s.fillet) if s.fillet else "-")]
     rolls = [row("roll about the axis, deg", lambda s: f"{s.roll}", True)]
     groups = [row("pressure group", lambda s: f"{s.group}", True)]
     return [
@@ -70,6 +71,7 @@ def segment_table(manipulator: Manipulator) -> list[tuple[str, list[str]]]:
         row("material", lambda s: s.material.name, True),
         row("shear modulus, MPa", lambda s: plain(s.material.mu, 4), True),
         *(layers if any(s.layer_thickness for s in manipulator.segments) else []),
+        *(fillets if any(s.fillet for s in manipulator.segments) else []),
         *(rolls if any(s.roll for s in manipulator.segments) else []),
         *(groups if len(manipulator.groups) > 1 else []),
     ]

@@ -18,9 +18,9 @@ from pneunet.base.system.interrupts import at_once, kept
 from pneunet.geometry import tags
 from pneunet.geometry.cad.polyhedra import bar_solid, channel_solid
 from pneunet.geometry.ends import Bar, PlacedSegment, placed
-from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.geometry.sections import rotation
+from pneunet.geometry.snapping import snapped
 
 _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
 

@@ -2,13 +2,13 @@
 other.
 
 All faces of a cell are planes across X3, across X2 or across xi = X1 less the chambers' lean
-(geometry.grids.planes). A map that is piecewise linear in each of these coordinates takes the planes of one
+(geometry.ends). A map that is piecewise linear in each of these coordinates takes the planes of one
 cell to those of another, and its grid to the other's.
 """
 
 import numpy as np
 
-from pneunet.geometry.grids.planes import lean
+from pneunet.geometry.ends import lean
 from pneunet.geometry.parameters import TWISTING, Segment
 
 

@@ -15,10 +15,10 @@ from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad.polyhedra import bar_solid, lofted, polyhedron
 from pneunet.geometry.ends import Bar, placed
 from pneunet.geometry.fillets import rounding
-from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.moulds.layers import Run
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.snapping import snapped
 
 #: chords of a quarter of a rounded edge
 CHORDS = 4

@@ -14,6 +14,7 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.system.progress import progress
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad import mould_solids as solids
 from pneunet.geometry.cad.meshing import TRIANGLE, write_model
@@ -126,7 +127,7 @@ def mould_parts(manipulator: Manipulator, moulds: Moulds, folder: Path | None = 
     forms.append(_pin(moulds, sum(_dowels(run, moulds) for run in found)))
     for form in forms:
         _refuse_larger(form, moulds)
-    for form in forms:
+    for form in progress(forms, "parts to print"):
         yield form.part(folder / f"{form.name}.step" if folder else None)
 
 

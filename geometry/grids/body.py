@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneunet.geometry import tags
-from pneunet.geometry.ends import End, ends_of, joined
+from pneunet.geometry.ends import End, ends_of, joined, lean
 from pneunet.geometry.grids.cell import contents
-from pneunet.geometry.grids.planes import Planes, along, lean, sideways, snapped, upright
+from pneunet.geometry.grids.planes import Planes, along, sideways, upright
 from pneunet.geometry.grids.tensor import AIR_OF_GROUP, CHANNEL_AIR, EMPTY, TensorGrid
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.geometry.sections import rotation
+from pneunet.geometry.snapping import snapped
 
 
 def body_grid(manipulator: Manipulator, size: float) -> TensorGrid:

@@ -4,10 +4,12 @@ rest."""
 import numpy as np
 
 from pneunet.geometry import tags
+from pneunet.geometry.ends import lean
 from pneunet.geometry.fillets import NO_CELL, refuse_fillets
-from pneunet.geometry.grids.planes import along, lean, sideways, snapped, upright
+from pneunet.geometry.grids.planes import along, sideways, upright
 from pneunet.geometry.grids.tensor import CAVITY_AIR, CHANNEL_AIR, EMPTY, TensorGrid
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
+from pneunet.geometry.snapping import snapped
 
 #: kind -> diagonals of the half turns, about axes through a chamber's middle, that take a cell to itself
 HALF_TURNS = {ONE_SIDED: ((-1, -1, 1),), TWISTING: ((-1, -1, 1), (1, -1, -1), (-1, 1, -1))}

@@ -18,10 +18,10 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.geometry.ends import Bar, placed
-from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import PASSIVE, TWISTING, Manipulator, Segment
 from pneunet.geometry.sections import rotation
+from pneunet.geometry.snapping import snapped
 
 #: mm; floors at one height
 SAME = 1e-9

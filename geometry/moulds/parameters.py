@@ -6,8 +6,8 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.quantities import Checked, quantities, quantity
-from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.parameters import OF_CHAMBERS, Manipulator, Segment
+from pneunet.geometry.snapping import snapped
 
 #: mm: what a printer still prints as a fin
 THINNEST_FIN = 0.4

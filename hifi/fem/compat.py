@@ -38,7 +38,6 @@ _FLAGS = [
     "-fassociative-math",
     "-fno-signed-zeros",
 ]
-VERSION = dolfinx.__version__
 MeshTags = dolfinx.mesh.MeshTagsMetaClass if OLD else dolfinx.mesh.MeshTags
 Form = fem.FormMetaClass if OLD else fem.Form
 

@@ -17,8 +17,8 @@ from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import Manipulator, Segment, tags
 from pneunet.geometry.cad import body as cad
-from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.reference_cases import CASES
+from pneunet.geometry.snapping import snapped
 
 ONE_SIDED, TWISTING = (
     Segment("one-sided", 60.0, 3),

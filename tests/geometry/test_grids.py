@@ -9,12 +9,12 @@ from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.geometry.grids.body import body_grid
 from pneunet.geometry.grids.cell import cell_grid
-from pneunet.geometry.grids.planes import SNAP, snapped
 from pneunet.geometry.grids.sample import random_manipulator, random_segment
 from pneunet.geometry.meshfile import open_edges
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Manipulator, Segment
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.sections import rotation
+from pneunet.geometry.snapping import SNAP, snapped
 
 KINDS = ("one_sided_w10", "twist_w12")
 
