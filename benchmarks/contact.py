@@ -38,7 +38,7 @@ def run(folder, body, contact, pressure=TOP, levels=5, size=SIZE, **case):
     path, states, touches = Path(folder) / f"{time.monotonic_ns()}.npz", [], []
     started = time.process_time()
     solve_cell(
-        CellCase(body, pressure, size, levels, contact=contact, **case),
+        CellCase(body, pressure, size, levels, contact=contact, element="tetrahedra", **case),
         path,
         states.append,
         on_touch=touches.append,

@@ -33,7 +33,7 @@ def run(folder):
 
     segment = CASES["twist_w15"](angle=60.0, chambers=CHAMBERS, material=NeoHookean(0.317))
     comm, body = MPI.COMM_WORLD, Manipulator((segment,))
-    on_rank_0(comm, lambda: mesh_manipulator(body, SIZE, folder) and None)
+    on_rank_0(comm, lambda: mesh_manipulator(body, SIZE, folder, "tetrahedra") and None)
     solve = ManipulatorSolve(body, folder / "manipulator.npz", contact=WallPenalty())
     pitch, stations = body.segments[0].pitch, solve.sections.stations
     centre = solve.sections.segment_stations[0][CHAMBERS // 2]

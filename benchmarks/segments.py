@@ -11,7 +11,7 @@ from benchmarks.tables import table
 
 CHAMBERS = (9, 30)
 COST_MESH, COST_LEVELS, COST_PRESSURE = 2.0, 4, 0.02  # mm; equal steps to that pressure in MPa
-STRAIN_MESH, STRAIN_PRESSURE = 1.0, 0.05
+STRAIN_MESH, STRAIN_PRESSURE = 1.5, 0.05
 
 
 def segment(chambers):
@@ -36,13 +36,13 @@ def walk(system, path, pressure, levels):
 
 
 def cell_step(folder):
-    from pneunet.geometry.cad.cell import mesh_cell
+    from pneunet.geometry.cad.grid import grid_cell
     from pneunet.hifi.cell.problem import CellProblem
     from pneunet.hifi.cell.system import CellSystem
     from pneunet.hifi.path.control import LoadControl
     from pneunet.hifi.path.equilibrium import EquilibriumPath
 
-    mesh_cell(segment(1), COST_MESH, folder / "cell.npz")
+    grid_cell(segment(1), COST_MESH, folder / "cell.npz", part=True)
     system = CellSystem(CellProblem(segment(1), folder / "cell.npz"))
     seconds, facts = walk(system, EquilibriumPath(system, LoadControl()), COST_PRESSURE, COST_LEVELS)
     facts["unknowns"] = system.problem.unknowns

@@ -34,7 +34,7 @@ def make(directory, mesh_size, manipulator=None):
             json.dumps(segment_tables(manipulator))
         ):
             return directory
-    mesh_manipulator(manipulator, mesh_size, directory)
+    mesh_manipulator(manipulator, mesh_size, directory, "tetrahedra")
     with atomic_path(directory / "mesh.npz") as temporary:
         with open(temporary, "wb") as file:
             np.savez(file, **arrays(directory / "manipulator.npz"))
