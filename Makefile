@@ -37,7 +37,7 @@ silicones: setup ## the table of silicones from tensile tests (DATA=folder)
 image: ## container image `pneunet` (podman, docker or buildah)
 	@containers/build.sh
 
-image-test: setup image ## the image against this machine: doctor, one FE case, CLI tests
+image-test: setup image ## the image against this machine: doctor, one FE case, all tests
 	@containers/image-test.sh
 
 clean: ## remove results and caches; .venv stays

@@ -14,7 +14,9 @@ from pathlib import Path
 
 from benchmarks import (
     cell,
+    cell_grids,
     chain,
+    cluster,
     compare,
     contact,
     contact_page,
@@ -23,9 +25,11 @@ from benchmarks import (
     doubt,
     grids,
     house,
+    image,
     kills,
     law,
     moulds,
+    notebooks,
     paper,
     paper_page,
     people,
@@ -56,6 +60,18 @@ PARTS = {
     "kills": (kills.kills, "60 runs killed with SIGKILL at random moments and run again; some 6 minutes"),
     "demo": (chain.demo, "make demo after set-up, wall seconds, and its reduced-against-FE distance"),
     "test": (chain.test, "make test with a cold form cache, wall seconds"),
+    "ci": (
+        cluster.ci,
+        "continuous integration from a clean clone, caches and images made anew, wall minutes; half an hour",
+    ),
+    "image": (
+        image.image,
+        "make image-test (all tests in the image), its demo beside that of make demo; some 20 minutes",
+    ),
+    "slurm": (
+        cluster.on_slurm,
+        "a study and a solve on a real SLURM, put back into the queue midway; needs slurm-wlm; a minute",
+    ),
     "door": (
         door.door,
         "1500 generated bad inputs at every door of the command line: one line each; some 5 minutes",
@@ -66,7 +82,10 @@ PARTS = {
     ),
     "cell": (cell.unit_cell, "unit cell one-sided-w10, 60 deg: cost, mesh study, stiffness; some 5 minutes"),
     "grids": (grids.made, "grids of 10,000 random segments and 500 random manipulators; some 4 minutes"),
-    "cell-grids": (grids.cells, "cells of both kinds on grids of hexahedra: errors, cost; some 10 minutes"),
+    "cell-grids": (
+        cell_grids.cells,
+        "cells of both kinds on grids of hexahedra, and with contact: errors, orders, cost; some 30 minutes",
+    ),
     "body-grids": (grids.bodies, "the tip of a body at rest on grids and tetrahedra; some 3 minutes"),
     "segments": (
         segments.against_segments,
@@ -106,7 +125,11 @@ PARTS = {
         compare.compare,
         "public measurements: the clamped beam's drops beside a rod's and a body's; half a minute",
     ),
-    "view": (compare.view, "size of the page of `pneunet view` of the demo, after make demo; some seconds"),
+    "view": (
+        compare.view,
+        "sizes of the demo's page of `pneunet view` and of its report, after make demo; some seconds",
+    ),
+    "notebooks": (notebooks.notebooks, "the notebooks of examples/notebooks, executed; a minute"),
     "silicone-table": (silicones.table_of_silicones, "rows of the table of silicones with a test as source"),
     "design": (
         design.design,

@@ -32,4 +32,6 @@ def view():
     from pneunet.design.report.viewing import run_view
 
     with tempfile.TemporaryDirectory() as folder:
-        return {"view_html_MB": run_view(DEMO, folder).stat().st_size / 1e6}
+        page = run_view(DEMO, folder)
+        sizes = {"view_html_MB": page, "report_html_MB": DEMO / "report.html"}
+        return {key: path.stat().st_size / 1e6 for key, path in sizes.items()}

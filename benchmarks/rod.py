@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.grids import ORDER
+from benchmarks.cell_grids import ORDER
 from benchmarks.tables import below_mark, table
 
 PRESSURE = 0.02

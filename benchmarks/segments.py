@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.tables import table
 
 CHAMBERS = (9, 30)
-COST_MESH, COST_LEVELS, COST_PRESSURE = 2.0, 4, 0.02  # mm; equal steps to that pressure in MPa
+COST_MESH, COST_LEVELS, COST_PRESSURE = 3.0, 4, 0.02  # mm; equal steps to that pressure in MPa
 STRAIN_MESH, STRAIN_PRESSURE = 1.5, 0.05
 
 
@@ -64,7 +64,7 @@ def finite(folder, chambers, mesh_size):
     from pneunet.hifi.body.manipulator import ManipulatorSolve
 
     body = Manipulator((segment(chambers),))
-    mesh_manipulator(body, mesh_size, folder / str(chambers))
+    mesh_manipulator(body, mesh_size, folder / str(chambers), "hexahedra")
     return ManipulatorSolve(body, folder / str(chambers) / "manipulator.npz")
 
 
@@ -103,7 +103,8 @@ def against_segments():
         cell_step(folder)  # compiles the forms
         costs = {"cell": cell_step(folder), **{n: segment_step(folder, n) for n in CHAMBERS}}
         states = []
-        solve_cell(CellCase(segment(1), STRAIN_PRESSURE, STRAIN_MESH, 5), folder / "fine.npz", states.append)
+        case = CellCase(segment(1), STRAIN_PRESSURE, STRAIN_MESH, 5, element="hexahedra")
+        solve_cell(case, folder / "fine.npz", states.append)
         found, dofs = middle(folder)
     pitch, errors, rows = segment(1).pitch, [], []
     for pressure, (e, k) in found.items():

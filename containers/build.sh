@@ -47,10 +47,14 @@ mkdir "$scratch/context"
     while IFS= read -r -d '' file; do [ ! -e "$file" ] || printf '%s\0' "$file"; done |
     tar --null -T - -cf -) | tar -C "$scratch/context" -xf -
 
+# There is no history in it, so a file says which revision it is.
+revision="$(git -C "$root" describe --always --dirty --abbrev=12)"
+echo "$revision" >"$scratch/context/.revision"
+
 say "building with $tool on $base"
 # Empty on the first build: buildah ends with an error for an image that it does not know.
 previous="$("$tool" images -q "$image" 2>/dev/null | head -n 1 || true)"
-build_image "$base" "$scratch/context" "$image"
+build_image "$base" "$scratch/context" "$image" "$revision"
 # The image that lost its name to the new one; layers that the new one uses stay.
 if [ -n "$previous" ] && [ "$("$tool" images -q "$image" | head -n 1)" != "$previous" ]; then
     "$tool" rmi "$previous" >/dev/null 2>&1 || true

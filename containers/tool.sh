@@ -36,9 +36,9 @@ import_base() {
     fi
 }
 
-# build_image BASE CONTEXT NAME
+# build_image BASE CONTEXT NAME REVISION
 build_image() {
-    local options=(--build-arg "BASE=$1" -f "$2/containers/Containerfile" -t "$3")
+    local options=(--build-arg "BASE=$1" --build-arg "REVISION=$4" -f "$2/containers/Containerfile" -t "$3")
     local ca="${PIP_CERT:-${SSL_CERT_FILE:-}}"
     [ -z "$ca" ] || options+=(--secret "id=site-ca,src=$ca")
     case "$tool" in
@@ -47,12 +47,13 @@ build_image() {
     esac
 }
 
-# in_image DIR COMMAND...: runs a command in the image, DIR seen as /data, without a network.
+# in_image DIR COMMAND...: runs a command in the image as who owns DIR, which is seen as /data, without a network.
 in_image() {
     local dir="$1" container code=0 pass=()
     shift
+    pass=(--user "$(stat -c %u:%g "$dir")")
     # Some processors need to tell OpenBLAS which kernel to use.
-    [ -z "${OPENBLAS_CORETYPE:-}" ] || pass=(-e "OPENBLAS_CORETYPE=$OPENBLAS_CORETYPE")
+    [ -z "${OPENBLAS_CORETYPE:-}" ] || pass+=(-e "OPENBLAS_CORETYPE=$OPENBLAS_CORETYPE")
     if [ "$tool" = buildah ]; then
         container="$(buildah from "$image")"
         buildah run "${pass[@]}" --volume "$dir:/data" "$container" -- "$@" </dev/null || code=$?

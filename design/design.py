@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
-import scipy
 
 from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
@@ -225,9 +224,8 @@ class Design:
                 write_text(directory / "split.toml", SPLIT + piece_tables(content.result["piece"]))
         write_csv(directory / "centreline.csv", CENTRELINE, np.column_stack([line.s, line.points]))
         write_design_file(directory / "design.toml", content)
-        versions = {"numpy": np.__version__, "scipy": scipy.__version__}
         inputs = self.effort.get("inputs", {}) | {"law": self.law.name}
-        record = {"inputs": inputs, "versions": versions, "doubts": list(self.doubts)}
+        record = {"inputs": inputs, "doubts": list(self.doubts)}
         write_record(directory, **(self.effort | record))
         try:
             rendering.save(self.plot(), directory / "design.png")

@@ -16,6 +16,7 @@ from pneunet.base.files.schemas import SHAPES
 from pneunet.base.pictures.painting import paint, show_scale_and_axes, write_text_on
 from pneunet.base.pictures.rendering import view_of
 from pneunet.base.pictures.vtp import write_quads
+from pneunet.base.system.progress import progress
 from pneunet.base.units import in_MPa
 from pneunet.design.design import Design
 from pneunet.design.report.labels import kPa, plain, rgb, segment_colour
@@ -144,7 +145,8 @@ def _bodies(design, pressures):
     """`body_surface` at pressures in kPa."""
     pose = design.content.base_pose
     scaled = [design.content.scaled(in_MPa(p)) for p in pressures]
-    return [body_surface(design.manipulator, p, design.law, SPACING, pose) for p in scaled]
+    each = progress(scaled, "bodies")
+    return [body_surface(design.manipulator, p, design.law, SPACING, pose) for p in each]
 
 
 def _view(bodies):
@@ -182,7 +184,7 @@ def _animation(design, highest, path):
     pressures, frames = highest * np.linspace(0, 1, FRAMES), []
     bodies = _bodies(design, pressures)
     view = _view(bodies)
-    for p, body in zip(pressures, bodies):
+    for p, body in progress(zip(pressures, bodies), "frames", FRAMES):
         frame = _painted(view, body, FRAME_PIXELS)
         write_text_on(frame, (12, 10), f"{p:.0f} kPa", FRAME_PIXELS[1] / 22, "la")
         frames.append(frame.quantize(COLOURS, Image.Quantize.FASTOCTREE))

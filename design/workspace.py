@@ -25,6 +25,7 @@ from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, material_f
 from pneunet.base.pictures import rendering
 from pneunet.base.quantities import Checked, quantities, quantity, shown
 from pneunet.base.strains import RodStrains
+from pneunet.base.system.progress import progress
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, PER_MM_PER_M
 from pneunet.design.design import chosen_law
 from pneunet.design.search.space import START
@@ -284,7 +285,7 @@ def workspace(
         picks = _picks(len(chain), len(angles), len(loaded), count)
         blocks = [picks[i : i + BLOCK] for i in range(0, len(picks), BLOCK)]
         work = partial(_tips, tables=[tables[kind] for kind in chain], loaded=loaded)
-        found = np.concatenate(list(mapping(work, blocks)))
+        found = np.concatenate(list(progress(mapping(work, blocks), "blocks of shapes", len(blocks))))
         known = np.isfinite(found).all(axis=1)
         lost += int((~known).sum())
         picks, found = picks[known], found[known]

@@ -20,6 +20,7 @@ from pneunet.base.files.toml import (
 from pneunet.base.materials.laws import Hyperelastic, material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity, rounded, shown
 from pneunet.base.units import KPA_PER_MPA, LARGEST_PRESSURE_KPA
+from pneunet.geometry.fillets import NO_GRID, refuse_fillets
 from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_control
 from pneunet.geometry.meshfile import ELEMENTS, USUAL_ELEMENT
 from pneunet.geometry.parameters import NO_CHAMBERS, OF_CHAMBERS, PASSIVE, PLAIN, Manipulator, Segment
@@ -64,6 +65,8 @@ class DesignFile(Checked):
                 told = f"{pressure * KPA_PER_MPA:g}" if known else shown(pressure)
                 raise InputError(f"pressure_kPa = {told} must lie in 0..{LARGEST_PRESSURE_KPA:g} kPa")
         self.manipulator.pressures(self.pressure)
+        if self.element == "hexahedra":
+            refuse_fillets(self.manipulator.segments, NO_GRID)
         if self.largest_pressure == 0 and not self.loads:
             raise InputError("pressure_kPa = 0 leaves nothing to solve: give a pressure, or [loads]")
 
@@ -195,10 +198,10 @@ def body_tables(manipulator: Manipulator) -> list[dict]:
 
 def segment_table(segment: Segment) -> dict:
     """Every dimension of a segment that counts, in file units; no material. What is as it is for most, no
-    roll and the first group, is not written."""
+    roll, no fillet and the first group, is not written."""
     table = to_table(segment)
     drop = OF_CHAMBERS if segment.kind == PASSIVE else ("plain_length_mm",)
-    usual = {"roll_deg": 0, "pressure_group": 1}
+    usual = {"roll_deg": 0, "pressure_group": 1, "fillet_mm": 0}
     return {k: v for k, v in table.items() if k not in drop and usual.get(k) != v}
 
 

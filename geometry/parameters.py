@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from pneunet.base.errors import InputError, located
 from pneunet.base.materials.laws import BODY_LIMITS, Hyperelastic, NeoHookean
 from pneunet.base.quantities import Checked, quantities, quantity
+from pneunet.geometry.fillets import check_fillet
 from pneunet.geometry.sections import joint_is_covered
 from pneunet.geometry.tags import MOST_GROUPS
 
@@ -32,7 +33,7 @@ NO_CHAMBERS = "a passive segment has no chambers: leave this out"
 #: keys of Segment in files that say what chambers are like
 OF_CHAMBERS = (
     *("angle_deg", "chambers", "chamber_height_mm", "cavity_thickness_mm", "wall_mm", "gap_mm"),
-    *("top_wall_mm", "side_wall_mm", "cavity_floor_mm"),
+    *("top_wall_mm", "side_wall_mm", "cavity_floor_mm", "fillet_mm"),
 )
 #: and what the core is like
 OF_THE_CORE = (
@@ -69,12 +70,12 @@ class Segment(Checked):
     cavity_floor: float = quantity("mm", 1.0, "z of the cavity's floor; at most half the channel height")
     end_margin: float = _size(
         2.0,
-        "bare core beyond the outermost corner of a chamber, each end; passive: what closes the channel at"
-        " the end of its cavity",
+        "bare core beyond a chamber's outermost corner, each end; passive: what closes its channel's end",
     )
     layer_thickness: float = quantity(
         "mm", 0.0, "stiff layer at the bottom of the base (one-sided, passive); 0 = none"
     )
+    fillet: float = quantity("mm", 0.0, "radius of chambers' edges; in CAD and tetrahedra", low=0)
     plain_length: float = quantity("mm", 0.0, "of a passive segment", low=0, high=2000)
     roll: int = quantity(
         "deg",
@@ -102,6 +103,7 @@ class Segment(Checked):
             self._check_passive()
         else:
             self._check_chambers()
+            check_fillet(self)
         if self.length > 2000:
             raise InputError(
                 f"chambers = {self.chambers}: the segment would be {self.length:.0f} mm long (at most 2000)"
@@ -194,7 +196,9 @@ class Segment(Checked):
         on, in the segment's own axes."""
         if self.kind == PASSIVE:
             return replace(self, plain_length=2.0, end_margin=1.0, roll=0, group=1)
-        return replace(self, chambers=1, end_margin=1.0 + self.gap / self.sin / 2, roll=0, group=1)
+        return replace(
+            self, chambers=1, end_margin=1.0 + self.gap / self.sin / 2, roll=0, group=1, fillet=0.0
+        )
 
     @property
     def mirrored(self) -> "Segment":

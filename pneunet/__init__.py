@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pneunet.design.target.target import Target as Target
     from pneunet.design.workspace import Workspace as Workspace
     from pneunet.design.workspace import workspace as workspace
+    from pneunet.front import fit_material as fit_material
     from pneunet.front import loads as loads
     from pneunet.front import material as material
     from pneunet.front import predict as predict
@@ -76,6 +77,7 @@ _PLACES = {
     "TipPoints": "design.target.shapes",
     "Workspace": "design.workspace",
     "compare": "design.measured.comparison",
+    "fit_material": "front",
     "inverse_design": "design.inverse_design",
     "loads": "front",
     "material": "front",

@@ -2,26 +2,44 @@
 
 import argparse
 import math
+import shutil
+import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NoReturn
 
 from pneunet.base.errors import InputError
 from pneunet.base.units import LARGEST_PRESSURE_KPA
+from pneunet.manual import EXIT_CODES, PAGES, TOP
+from pneunet.start import KINDS
 
+#: shells that `pneunet completion` knows
+SHELLS = ("bash", "zsh", "fish")
 #: a design's file in its folder
 DESIGN = "design.toml"
 A_DESIGN = "a design.toml, or the folder that holds it"
+A_CAMPAIGN = "the campaign; pneunet init campaign writes one"
 
 
 class Parser(argparse.ArgumentParser):
     """Errors are InputErrors; --pressure is not taken for --pressure-kPa: the unit is part of the name."""
 
     def __init__(self, **options):
-        super().__init__(**options, allow_abbrev=False)
+        as_written = argparse.RawDescriptionHelpFormatter
+        super().__init__(**options, allow_abbrev=False, formatter_class=as_written)
+
+    def format_help(self) -> str:
+        self.description = _in_columns(self.description or "")
+        return super().format_help()
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} ({self.prog} --help tells more)")
+
+
+def _in_columns(text):
+    """Paragraphs as wide as the terminal, as argparse counts it, and no wider than is read with ease."""
+    width = min(shutil.get_terminal_size().columns - 2, 100)
+    return "\n\n".join(textwrap.fill(paragraph, width) for paragraph in text.split("\n\n"))
 
 
 class _Version(argparse.Action):
@@ -119,17 +137,26 @@ def whole(text: str) -> int:
     return int(text)
 
 
+#: types of arguments that are names of files, and of folders
+FILES, FOLDERS = (path, design_file), (run_folder,)
+
+
 def parser(functions: Mapping[str, Callable]) -> Parser:
     """The parser; functions: {command: what is called with its arguments}."""
     top = Parser(
         prog="pneunet",
-        description="From a 3D target curve to a pneu-net soft manipulator, proven in finite elements.",
+        description=TOP.about,
+        epilog=f"pneunet COMMAND --help tells more.\n\n{TOP.epilog()}\n\n{EXIT_CODES}",
     )
     top.add_argument("--version", action=_Version, nargs=0, help="name, version and revision")
-    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    commands = top.add_subparsers(
+        title="commands", dest="command", metavar="COMMAND", required=True, parser_class=Parser
+    )
 
     def add(name, text):
-        command = commands.add_parser(name, help=text, description=text)
+        page = PAGES[name]
+        description = f"{text}\n\n{page.about}"
+        command = commands.add_parser(name, help=text, description=description, epilog=page.epilog())
         command.set_defaults(function=functions[name])
         return command.add_argument
 
@@ -150,6 +177,10 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
         argument("--retry", action="store_true", help=text)
 
     finished = "; finished cases there are kept"
+
+    a = add("init", "a file with comments to start from: a target, a design, a cell, a study, a campaign")
+    a("kind", choices=tuple(KINDS), help="what it is of")
+    a("file", type=path, nargs="?", metavar="FILE.toml", help="default: KIND.toml, here")
 
     a = add("design", "inverse design: target curve (CSV or TOML) -> design.toml, centreline.csv, design.png")
     a("target", type=path, help="a file, or the name of a shipped target: octopus, tentacle2, vase, pear")
@@ -195,13 +226,13 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
 
     text = "one pitch of a long segment: strains, volume and rod stiffness over pressure, or at given strains"
     a = add("cell", text)
-    a("cell", type=path, metavar="CELL.toml")
+    a("cell", type=path, metavar="CELL.toml", help="the cell; pneunet init cell writes one")
     add_output(a, "the file's folder")
 
     text = "cells, segments or manipulators over a grid or a list"
     text += "; on MPI ranks: pneunet run -n 3 study STUDY.toml"
     a = add("study", text)
-    a("study", type=path, metavar="STUDY.toml")
+    a("study", type=path, metavar="STUDY.toml", help="the study; pneunet init study writes one")
     add_retry(a)
     add_output(a, f"out/NAME of the study{finished}")
 
@@ -209,15 +240,15 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
         "cells over a space-filling sample of designs, for the rod law: pneunet run -n 3 campaign FILE.toml"
     )
     a = add("campaign", text)
-    a("campaign", type=path, metavar="CAMPAIGN.toml")
+    a("campaign", type=path, metavar="CAMPAIGN.toml", help=A_CAMPAIGN)
     text = "a data set whose cases are taken over, not computed again"
     a("--extend", type=path, metavar="DATA.npz", help=text)
     add_retry(a)
     add_output(a, f"out/NAME of the campaign{finished}")
 
     a = add("suggest", "further designs for a campaign: those that would teach the rod law most")
-    a("campaign", type=path, metavar="CAMPAIGN.toml")
-    a("--kind", choices=("one-sided", "twisting"), required=True)
+    a("campaign", type=path, metavar="CAMPAIGN.toml", help=A_CAMPAIGN)
+    a("--kind", choices=("one-sided", "twisting"), required=True, help="of the segments")
     a("-n", "--number", type=whole, default=100, metavar="100", help="how many; default: 100")
     text = "of how many designs that follow in the sample; default: 2000"
     a("--of", type=whole, default=2000, metavar="2000", help=text)
@@ -227,7 +258,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("--law", default="trained", metavar="LAW.npz", help=text)
 
     a = add("train", "the rod law from a data set of cells, with its errors on held-out designs")
-    a("data", type=path, metavar="DATA.npz")
+    a("data", type=path, metavar="DATA.npz", help="cells.npz of pneunet campaign")
     text = "keep the metrics and noises of this law: for data that have grown"
     a("--like", type=path, metavar="LAW.npz", help=text)
     a("--no-comparison", action="store_true", help="leave out the other laws and the learning curve")
@@ -242,7 +273,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     a("--film", choices=("gif", "mp4"), help="of the inflation, as well")
     a("--window", action="store_true", help="open a window as well, where there is a display")
     add_law(a, None)
-    add_output(a, "the design's folder, where the report finds the page")
+    add_output(a, "the design's folder")
 
     a = add(
         "compare", "a measurement over pressure beside its prediction, and the modulus that it speaks for"
@@ -259,7 +290,7 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_output(a, "compare/ in the design's folder")
 
     a = add("fit-material", "fit a material law to a tensile test (CSV) -> material.toml, fit.png")
-    a("test", type=path, metavar="TENSILE.csv")
+    a("test", type=path, metavar="TENSILE.csv", help="strain and stress, with their units")
     text = "neo-Hookean, Mooney-Rivlin, Yeoh, Gent, Ogden, or all (default): the best of them"
     a("--law", default="all", help=text)
     a("--stress-unit", help="where the file names none: MPa, kPa, Pa, psi, ...")
@@ -270,8 +301,11 @@ def parser(functions: Mapping[str, Callable]) -> Parser:
     add_output(a, "out/fit-NAME of the test")
 
     a = add("run", "start a pneunet command (or, after --, any program) on N MPI ranks")
-    a("-n", "--ranks", type=int, required=True)
-    a("rest", nargs=argparse.REMAINDER, metavar="COMMAND ...")
+    a("-n", "--ranks", type=int, required=True, help="how many; commands with cases compute on all but one")
+    a("rest", nargs=argparse.REMAINDER, metavar="COMMAND ...", help="as it is written without run -n N")
 
     add("doctor", "check this installation and say what to fix")
+
+    a = add("completion", "what makes a shell complete pneunet's commands, options and files")
+    a("shell", choices=SHELLS, help="which it is for")
     return top

@@ -20,10 +20,15 @@ from pneunet.base.system.launch import rank_map
 from pneunet.base.system.libraries import told_what_to_install
 from pneunet.base.system.log import complain, show_on_screen
 from pneunet.base.units import MPA_PER_KPA
+from pneunet.start import write_start
 
 #: exit code of a design that is written, but does not follow its target
 NOT_FOLLOWED = 3
 log = logging.getLogger(__name__)
+
+
+def init(a: Namespace) -> None:
+    write_start(a.kind, a.file)
 
 
 def design(a: Namespace) -> int:
@@ -159,7 +164,14 @@ def doctor(a: Namespace) -> int:
     return check.main()
 
 
+def completion(a: Namespace) -> None:
+    from pneunet.completion import script
+
+    print(script(parser(COMMANDS), a.shell))
+
+
 COMMANDS = {
+    "init": init,
     "design": design,
     "shape": shape,
     "workspace": workspace,
@@ -177,6 +189,7 @@ COMMANDS = {
     "fit-material": fit_material,
     "run": run,
     "doctor": doctor,
+    "completion": completion,
 }
 
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.files.toml import from_table
+from pneunet.base.materials.fit_run import run_fit
+from pneunet.base.materials.fitting import Fit
 from pneunet.base.materials.laws import Hyperelastic, material_from_table
 from pneunet.base.units import each_in_MPa
 from pneunet.design.design import Design, chosen_law
@@ -38,6 +40,24 @@ def material(**keys: object) -> Hyperelastic:
     """A material from a design.toml's keys: material(law="Yeoh", c10_MPa=0.1, c20_MPa=0.01) or
     material(silicone="Ecoflex 00-30"). InputError that names key and fix otherwise."""
     return material_from_table(keys, "material")
+
+
+def fit_material(
+    path: str | Path,
+    law: str = "all",
+    *,
+    directory: str | Path | None = None,
+    stress_unit: str | None = None,
+    to_strain_percent: float | None = None,
+    gauge_length_mm: float | None = None,
+) -> Fit:
+    """Fit a material law to a table of tensile tests (docs/materials.md): its material, error and warnings.
+
+    directory: gets material.toml and fit.png, by default out/fit-NAME. to_strain_percent: fit no further, by
+    default 150. gauge_length_mm: of elongations in mm. InputError where the table or the law is none.
+    """
+    strain = None if to_strain_percent is None else to_strain_percent / 100
+    return run_fit(path, law, directory, stress_unit, strain, gauge_length_mm)
 
 
 def loads(**keys: object) -> DeadLoads:
@@ -107,4 +127,4 @@ def view(directory: str | Path, film: str | None = None, window: bool = False) -
     """Write view.html of a design's folder: the body to turn in any browser, with a slider over load steps;
     its path. film: 'gif' or 'mp4' of the inflation as well; window: open one, where there is a display.
     InputError where the folder holds no design, or for another film."""
-    return run_view(directory, film=film and f".{film}", window=window)
+    return run_view(directory, film=film and f".{film}", in_window=window)

@@ -54,7 +54,7 @@ NUMPY_AND_SCIPY_ALONE = """
 import importlib, pkgutil, sys
 
 BLOCKED = {"dolfinx", "gmsh", "mpi4py", "petsc4py", "vtk", "vtkmodules", "pyvista", "matplotlib", "PIL"}
-BLOCKED |= {"trimesh", "manifold3d", "plotly"}
+BLOCKED |= {"trimesh", "manifold3d", "plotly", "shtab"}
 BLOCKED |= {"fcntl", "resource"}  # of Linux and macOS alone
 
 class Blocker:

@@ -47,10 +47,7 @@ def _counts(data, k):
             continue
         share = data.accepted[rows].mean()
         numbers = [
-            (
-                f"{mesh['name']}"
-                f" ({', '.join(f'{key} {value:g}' for key, value in mesh.items() if key != 'name')})"
-            ),
+            f"{mesh['name']} ({', '.join(_settings(mesh))})",
             rows.sum(),
             f"{data.accepted[rows].sum()} ({share:.1%})",
             (rows & data.held_out).sum(),
@@ -61,6 +58,13 @@ def _counts(data, k):
             f"{data.seconds[rows].sum() / 3600:.2f}",
         ]
         yield "| " + " | ".join(map(str, numbers)) + " |"
+
+
+def _settings(mesh):
+    """A text each: sizes, and the kind of its elements where that is told."""
+    for key, value in mesh.items():
+        if key != "name":
+            yield f"{key} {value if isinstance(value, str) else f'{value:g}'}"
 
 
 def _ranges(data, k):

@@ -12,14 +12,19 @@ from typing import Any
 
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.reading import read_json
+from pneunet.base.files.versions import versions
 
 #: folder that holds the packages of a checkout
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def revision() -> str:
-    """Git revision of the checkout that this code runs from, with '-dirty' when it has local changes; the
-    package's version where the code is installed, whatever repository that is in."""
+    """Git revision of the checkout that this code runs from, with '-dirty' when it has local changes, or what
+    a copy without history says it is of; the package's version where the code is installed, whatever
+    repository that is in."""
+    told = ROOT / ".revision"
+    if told.exists():
+        return told.read_text().strip()
     if (ROOT / ".git").exists() and (ROOT / "pyproject.toml").exists():
         line = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=12"]
         try:
@@ -51,12 +56,13 @@ def machine() -> dict:
 
 
 def write_record(directory: str | Path, name: str = "run.json", **entries: Any) -> dict:
-    """Write run.json: command, time, revision, machine, and whatever the caller knows (inputs, versions,
+    """Write run.json: command, time, revision, versions, machine, and whatever the caller knows (inputs,
     steps)."""
     record = {
         "command": " ".join(Path(a).name if i == 0 else a for i, a in enumerate(sys.argv)),
         "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "revision": revision(),
+        "versions": versions(),
         "machine": machine(),
         **entries,
     }

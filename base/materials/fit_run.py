@@ -15,6 +15,7 @@ from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
 from pneunet.base.materials.laws import LAWS, Hyperelastic, material_to_table
 from pneunet.base.materials.tensile import Specimen, read_tensile
+from pneunet.base.system.progress import progress
 from pneunet.base.units import KPA_PER_MPA
 
 log = logging.getLogger(__name__)
@@ -68,7 +69,7 @@ def _fit(path, law, directory, stress_unit, largest_strain, gauge_length):
     }
     fits, refused = {}, {}
     log.info(f"{path.name}: fitting {', '.join(LAWS)}")
-    for name in LAWS:
+    for name in progress(LAWS, "laws"):
         try:
             fits[name] = fit(name, tests, **common)
         except InputError as error:

@@ -19,6 +19,7 @@ MISSING = {
     **dict.fromkeys(("trimesh", "manifold3d"), "install it with: pip install 'pneunet[moulds]'"),
     **dict.fromkeys(("fcntl", "resource"), "this runs on Linux alone; elsewhere use the container image"),
     **dict.fromkeys(("plotly", "imageio_ffmpeg"), _VIEW),
+    "shtab": "install it with: pip install 'pneunet[completion]'",
     "gmsh": "install it with: pip install gmsh (in a checkout on Debian: make setup)",
 }
 

@@ -1,9 +1,9 @@
 """The ramp's body in FElupe, with MKL PARDISO through pypardiso: FElupe's regions, fields, solid body and
 pressure.
 
-FElupe takes any quadrature rule, so it integrates with ours; what its library lacks (tetrahedra's faces as a
-boundary region, this energy) is added the way its documentation shows. Everything that does not change is
-made once: the pattern of the matrix, and where each block's entries go in its upper triangle.
+FElupe takes any quadrature rule, so it integrates with ours; what its library lacks (a boundary region with
+that rule, this energy) is added the way its documentation shows. Everything that does not change is made
+once: the pattern of the matrix, and where each block's entries go in its upper triangle.
 """
 
 import felupe as fem
@@ -12,8 +12,6 @@ from pypardiso import PyPardisoSolver
 from ramp import MU, Body
 from scipy.sparse import csr_matrix
 
-#: edges of FElupe's quadratic tetrahedron, in the order of its mid-edge points
-EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 ANALYSE, FACTORISE, SOLVE = 11, 22, 33  # PARDISO's phases
 SYMMETRIC_INDEFINITE = -2
 #: own settings, METIS, pivots perturbed at 1e-8, Bunch-Kaufman, two-level factorisation: the fastest of ten
@@ -52,34 +50,47 @@ class Incompressible(fem.ConstitutiveMaterial):
         return [A, (J * G)[:, :, None], None]
 
 
-class TetraFaces(fem.Region):
-    """Faces 0, 1, 2 of quadratic tetrahedra as a boundary region with outward normals."""
+def rule(points, weights):
+    """FElupe's scheme of a rule on the unit square or cube: its own elements lie between -1 and 1."""
+    return fem.quadrature.Scheme(2 * points - 1, 2 ** points.shape[1] * weights)
+
+
+class Bottoms(fem.Region):
+    """The bottoms of hexahedra as a boundary region with outward normals; a rule on the unit square."""
 
     def __init__(self, mesh, points, weights):
-        on_face = fem.quadrature.Scheme(np.column_stack([points, np.zeros(len(points))]), weights)
-        super().__init__(mesh, fem.QuadraticTetra(), on_face)
-        normal = -np.cross(self.dXdr[:, 0], self.dXdr[:, 1], axis=0)  # vertex 3 lies on the other side
+        on_face = rule(np.column_stack([points, np.zeros(len(points))]), weights / 2)
+        super().__init__(mesh, fem.TriQuadraticHexahedron(), on_face)
+        normal = -np.cross(self.dXdr[:, 0], self.dXdr[:, 1], axis=0)  # the top lies on the other side
         length = np.linalg.norm(normal, axis=0)
         self.normals = normal / length
-        self.dV = length * weights[:, None]
+        self.dV = length * on_face.weights[:, None]
 
 
-class Quadratic:
-    """Quadratic tetrahedra of linear ones: points (vertices, then mid-edge points) and the cells of any of
-    its tets."""
+class Triquadratic:
+    """Triquadratic hexahedra of trilinear ones: points (vertices first) and the cells of any of its
+    hexahedra."""
 
-    def __init__(self, points, tets):
-        self.vertices = len(points)
-        self.keys, first = np.unique(self._keys(tets).ravel(), return_index=True)
-        edges = tets[:, EDGES].reshape(-1, 2)[first]
-        self.points = np.vstack([points, points[edges].mean(axis=1)])
+    def __init__(self, points, cells):
+        trilinear = fem.Hexahedron()
+        #: (27, 8) of a cell's points, their weights of its vertices
+        self.weights = np.array([trilinear.function(r) for r in fem.TriQuadraticHexahedron().points])
+        # a point is known by its vertices: the sum of random numbers of theirs
+        self._random = np.random.default_rng(1).integers(2**58, size=len(points))
+        vertices = 8 * self._random
+        others, first = np.unique(self._keys(cells)[:, 8:].ravel(), return_index=True)
+        self._known = np.concatenate([vertices, others])
+        places = np.einsum("qa,mai->mqi", self.weights[8:], points[cells]).reshape(-1, 3)
+        self.points = np.vstack([points, places[first]])
+        self._order = np.argsort(self._known)
 
-    def _keys(self, tets):
-        return np.sort(tets[:, EDGES], axis=2) @ np.array([self.vertices, 1])
+    def _keys(self, cells):
+        return self._random[cells] @ np.rint(8 * self.weights.T).astype(int)
 
-    def cells(self, tets):
-        """(m, 10) point numbers."""
-        return np.hstack([tets, self.vertices + np.searchsorted(self.keys, self._keys(tets))])
+    def cells(self, cells):
+        """(m, 27) point numbers."""
+        keys = self._keys(cells)
+        return self._order[np.searchsorted(self._known, keys, sorter=self._order)]
 
 
 class FElupeBody(Body):
@@ -87,21 +98,25 @@ class FElupeBody(Body):
 
     def __init__(self, mesh):
         super().__init__()
-        points, tets = mesh["points"], mesh["tets"]
-        quadratic = Quadratic(points, tets)
-        self.nodes = quadratic.points
-        rule = fem.quadrature.Scheme(mesh["volume_points"], mesh["volume_weights"])
+        points, cells = mesh["points"], mesh["cells"]
+        made = Triquadratic(points, cells)
+        self.nodes = made.points
+        inside = rule(mesh["volume_points"], mesh["volume_weights"])
         region = fem.Region(
-            fem.Mesh(self.nodes, quadratic.cells(tets), "tetra10"), fem.QuadraticTetra(), rule
+            fem.Mesh(self.nodes, made.cells(cells), "hexahedron27"),
+            fem.TriQuadraticHexahedron(),
+            inside,
         )
-        region_p = fem.Region(fem.Mesh(points, tets, "tetra"), fem.Tetra(), rule)
+        region_p = fem.Region(fem.Mesh(points, cells, "hexahedron"), fem.Hexahedron(), inside)
         self.field = fem.FieldContainer([fem.Field(region, dim=3), fem.Field(region_p, dim=1)])
         self.solid = fem.SolidBody(Incompressible(MU), self.field, block=False)
-        walls = fem.Mesh(self.nodes, quadratic.cells(np.vstack([mesh["cavity"], mesh["channel"]])), "tetra10")
-        surface = TetraFaces(walls, mesh["facet_points"], mesh["facet_weights"])
+        walls = np.vstack([mesh["cavity"], mesh["channel"]])
+        walls = fem.Mesh(self.nodes, made.cells(walls), "hexahedron27")
+        surface = Bottoms(walls, mesh["facet_points"], mesh["facet_weights"])
         self.pressure = fem.SolidBodyPressure(fem.FieldContainer([fem.Field(surface, dim=3)]), pressure=1.0)
         self.count_u, self.dofs = 3 * len(self.nodes), 3 * len(self.nodes) + len(points)
-        clamped = np.unique(quadratic.cells(mesh["base"])[:, [0, 1, 2, 4, 5, 6]])
+        below = fem.TriQuadraticHexahedron().points[:, 2] == -1
+        clamped = np.unique(made.cells(mesh["base"])[:, below])
         self.fixed = (3 * clamped[:, None] + np.arange(3)).ravel()
         self.state = np.zeros(self.dofs)
         self._prepare_matrix()
@@ -180,5 +195,5 @@ class FElupeBody(Body):
             return solution
 
     def displacements(self):
-        """(points (n, 3), displacements (n, 3)) at vertices and mid-edge points, in mm."""
+        """(points (n, 3), displacements (n, 3)) at all points, in mm."""
         return self.nodes, self.state[: self.count_u].reshape(-1, 3)

@@ -10,6 +10,7 @@ import numpy as np
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.pictures.walls import FIELD
+from pneunet.base.system.progress import progress
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report.bodies import listed_steps, read_step
 from pneunet.design.report.labels import plain
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 #: point data -> (what it is, with its unit; factor to that unit; colours, as matplotlib and plotly call them)
 FIELDS = {
-    "mean_stretch": ("largest principal stretch", 1.0, "Viridis"),
+    "mean_stretch": ("largest principal stretch", 1.0, "viridis"),
     FIELD: ("distance of facing walls, mm", 1.0, "RdYlBu"),
     "pressure": ("pressure in the silicone, kPa", KPA_PER_MPA, "RdBu"),
 }
@@ -86,7 +87,7 @@ def load_steps(run: DesignFolder, law: SegmentLaw, corners: bool = False) -> Loa
     pose, labels, points, shown_lines = run.design.base_pose, [], [], []
     fields: dict[str, list[np.ndarray]] = {}
     triangles, nodes = np.zeros((0, 3), int), np.zeros(0, int)
-    for i, path in enumerate(files):
+    for i, path in enumerate(progress(files, "load steps")):
         grid = read_step(path)
         if i == 0:
             triangles, nodes = outer_surface(grid, corners)

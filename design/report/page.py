@@ -31,9 +31,11 @@ td.long { white-space: normal; text-align: left; word-break: break-word; }
 figure { margin: .8rem 0; }
 .grid figure { margin: 0; }
 img { width: 100%; height: auto; border: 1px solid #e4e8ec; }
+.turn { width: 100%; height: 820px; border: 1px solid #e4e8ec; }
 figcaption { font-size: .85rem; color: #4b545c; }
 footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
 @media print {
+  .turn, .turn + p { display: none; }
   body { max-width: none; font-size: 11pt; padding: 0; }
   figure, tr, .verdict, .alarm { break-inside: avoid; }
   h2 { break-after: avoid; }

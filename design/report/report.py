@@ -12,6 +12,7 @@ from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import revision
 from pneunet.base.system.libraries import load_vtk
+from pneunet.base.system.progress import Pace
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report import figures
 from pneunet.design.report.bodies import Scene, read_solution
@@ -56,19 +57,20 @@ def _write(run, law, folder):
     comparison = Comparison.of(run, law)
     scene = Scene.of(run, comparison, law)
     draw_drawing(run.design, folder / "drawing.png")
-    body = _headline(run, comparison)
-    for title, content in (
+    body, pace = _headline(run, comparison), Pace()
+    sections = (
         ("Target, prediction, finite elements", lambda: _shapes(run, comparison, scene, folder)),
-        ("To turn by hand", lambda: framed(run.directory)),
+        ("To turn by hand", lambda: framed(run, law)),
         ("Errors", lambda: _errors(comparison, run)),
         ("Strains of the segments", lambda: _strains(run, comparison)),
         ("Load history", lambda: _history(run, law, folder)),
         ("Where walls touch", lambda: _walls(run, scene, folder)),
         ("Drawing, dimensions, material", lambda: _drawing(run, folder)),
         ("How it was computed", lambda: _computed(run)),
-    ):
-        log.info(f"  {title.lower()}")
+    )
+    for number, (title, content) in enumerate(sections, start=1):
         body += f"<section><h2>{escape(title)}</h2>{content()}</section>"
+        log.info(f"  {title.lower()}{pace.left(number / len(sections)) * (number < len(sections))}")
     page = (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

@@ -1,33 +1,33 @@
-"""`pneunet view`: a run to turn by hand, in a browser or a window, and as a film of its inflation."""
+"""`pneunet view`: a run to turn by hand in a browser, and the same scene within the report."""
 
 import logging
-import os
-import sys
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.atomic import atomic_path, write_text
+from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
-from pneunet.base.pictures.rendering import camera_angles, render, view_of
-from pneunet.design.report.labels import TARGET, segment_colour
+from pneunet.base.pictures.rendering import camera_angles
+from pneunet.design.report.labels import TARGET
 from pneunet.design.report.loadsteps import FIELDS, LoadSteps, load_steps
-from pneunet.design.report.rundata import read_design_folder
+from pneunet.design.report.page import missing
+from pneunet.design.report.rundata import DesignFolder, read_design_folder
+from pneunet.design.report.window import FILMS, LINE, PLAIN, has_display, shown_fields, window, write_film
 from pneunet.reduced.choice import choose_law
+from pneunet.reduced.rod.laws import SegmentLaw
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 log = logging.getLogger(__name__)
-#: bytes that a page may have, and those of plotly's own script in it
-LARGEST_PAGE, SCRIPT = 14_000_000, 4_900_000
+#: bytes that a page may have, so that a report that holds it stays below 15 MB with all its pictures, and
+#: those of plotly's own script in it
+LARGEST_PAGE, SCRIPT = 11_000_000, 4_900_000
 #: bytes that a number takes in a page: four, in base64
 NUMBER = 4 * 4 / 3
-LINE, PLAIN = "#111111", segment_colour(0)
-FILM_PIXELS, FILM_SECONDS = (720, 576), 4.0
-FILMS = (".gif", ".mp4")
 PAGE = "view.html"
 
 
@@ -36,20 +36,20 @@ def run_view(
     directory: str | Path | None = None,
     law: str | None = None,
     film: str | None = None,
-    window: bool = False,
+    in_window: bool = False,
 ) -> Path:
     """Write view.html of a design's folder, which turns and inflates in any browser, off line too; its path.
 
-    directory: by default the folder itself, where the report finds it. law: of the prediction where there
-    are no finite elements, by default the design's. film: '.gif' or '.mp4', writes inflation.gif or .mp4 as
-    well. window: open pyvista's, which needs a display. InputError where there is no design, or the fields
+    directory: by default the folder itself. law: of the prediction where there are no finite elements, by
+    default the design's. film: '.gif' or '.mp4', writes inflation.gif or .mp4 as well. in_window: open
+    pyvista's, which needs a display. InputError where there is no design, or the fields
     are damaged.
     """
     if film and film not in FILMS:
         raise InputError(f"film = '{film}': write {' or '.join(each[1:] for each in FILMS)}")
     if film == ".mp4":
         import imageio_ffmpeg  # noqa: F401  (that it is here is known before anything is written)
-    if window and not has_display():
+    if in_window and not has_display():
         raise InputError("--window: there is no display here: open view.html in a browser instead")
     found = read_design_folder(run)
     for text in found.damaged:
@@ -66,26 +66,22 @@ def run_view(
         if film:
             log.info("the film follows")
             log.info(f"film: {write_film(steps, folder / f'inflation{film}')}")
-    if window:
-        show_window(steps)
+    if in_window:
+        window(steps).show()
     return path
 
 
-def framed(directory: Path) -> str:
-    """HTML that shows the page in a frame of another one in the same folder, or says how to make it."""
-    if not (directory / PAGE).exists():
-        return '<p class="missing">To turn the body in a browser: pneunet view, with this folder.</p>'
+def framed(run: DesignFolder, law: SegmentLaw) -> str:
+    """HTML that holds the page in a frame of another one, or says why there is none."""
+    try:
+        content = page(_that_fit(run, law))
+    except ModuleNotFoundError:
+        return missing("To turn the body here: pip install 'pneunet[view]', then the report again.")
+    except InputError as error:
+        return missing(f"No body to turn: {error}")
     return (
-        f'<p><a href="{PAGE}">On a page of its own</a>, which lies beside this one.</p><iframe src="{PAGE}"'
-        ' title="the body, to turn" loading="lazy" style="width:100%;height:820px;border:1px solid #e4e8ec">'
-        "</iframe>"
-    )
-
-
-def has_display() -> bool:
-    """Whether a window can be opened."""
-    return sys.platform in ("win32", "darwin") or bool(
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        f'<iframe class="turn" srcdoc="{escape(content)}" title="the body, to turn" loading="lazy"></iframe>'
+        '<p class="missing">Turn and zoom with the mouse; the slider walks over the load steps.</p>'
     )
 
 
@@ -121,8 +117,7 @@ def scene(steps: LoadSteps) -> "Figure":
     slider over the load steps."""
     from plotly import graph_objects as go
 
-    keys: list[str] = [key for key in FIELDS if key in steps.fields] or [""]
-    last = len(steps.labels) - 1
+    keys, last = shown_fields(steps), len(steps.labels) - 1
 
     def moving(i):
         """What changes from step to step."""
@@ -223,63 +218,3 @@ def _controls(figure, steps, keys, last):
         margin={"l": 0, "r": 0, "t": 140, "b": 10},
         height=760,
     )
-
-
-def _meshes(steps, i):
-    """[(pyvista mesh, keywords)] of a step, for windows and films."""
-    import pyvista
-
-    body = pyvista.PolyData.from_regular_faces(steps.points[i], steps.triangles)
-    look: dict[str, Any] = {"color": PLAIN, "smooth_shading": False}
-    key = next((key for key in FIELDS if key in steps.fields), None)
-    if key:
-        body.point_data[key] = steps.fields[key][i]
-        look = {"scalars": key, "clim": steps.limits(key), "cmap": FIELDS[key][2].lower()}
-    things = [(body, look)]
-    things.append((pyvista.lines_from_points(steps.lines[i]).tube(radius=0.4), {"color": LINE}))
-    if steps.target is not None:
-        things.append((pyvista.lines_from_points(steps.target).tube(radius=0.5), {"color": TARGET}))
-    return things
-
-
-def write_film(steps: LoadSteps, path: Path) -> Path:
-    """The inflation as a GIF or MP4, by its ending; the path. InputError for another ending."""
-    if path.suffix not in FILMS:
-        raise InputError(f"{path}: a film is one of {', '.join(FILMS)}")
-    view = view_of(np.vstack(steps.points))
-    images = [render(view, _meshes(steps, i), FILM_PIXELS) for i in range(len(steps.labels))]
-    per_second = max(2.0, len(images) / FILM_SECONDS)
-    with atomic_path(path) as temporary:
-        if path.suffix == ".gif":
-            from PIL import Image
-
-            frames = [Image.fromarray(image).quantize(64) for image in images]
-            durations = [round(1000 / per_second)] * (len(frames) - 1) + [1200]
-            frames[0].save(temporary, save_all=True, append_images=frames[1:], duration=durations, loop=0)
-        else:
-            import imageio_ffmpeg
-
-            writer = imageio_ffmpeg.write_frames(str(temporary), FILM_PIXELS, fps=per_second)
-            writer.send(None)
-            for image in images:
-                writer.send(np.ascontiguousarray(image))
-            writer.close()
-    return path
-
-
-def show_window(steps: LoadSteps) -> None:
-    """pyvista's window with a slider over the load steps; returns when it is closed."""
-    import pyvista
-
-    plotter: Any = pyvista.Plotter(title=steps.name)
-    plotter.set_background("white")
-
-    def show(value):
-        for number, (mesh, look) in enumerate(_meshes(steps, round(value))):
-            plotter.add_mesh(mesh, name=str(number), **look)
-        plotter.add_text(steps.labels[round(value)], name="label", color="black", font_size=12)
-
-    last = len(steps.labels) - 1
-    plotter.add_slider_widget(show, (0, last), value=last, title="load step", color="black", fmt="%.0f")
-    plotter.add_axes()
-    plotter.show()

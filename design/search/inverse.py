@@ -15,6 +15,7 @@ import numpy as np
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.materials.laws import of_modulus
+from pneunet.base.system.progress import Pace, progress
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.aims import EQ27, OBJECTIVES, PAIRED, Aim
 from pneunet.design.search.groups import divided
@@ -34,6 +35,8 @@ Map = Callable[..., Iterable]
 #: the second
 FINE_ENOUGH, GOOD_ENOUGH = 1e-4, 1e-3
 STARTS = 4
+#: of a search's time, what is over after starts, whole chambers and grid: without and with gravity
+OVER = {False: (0.5, 0.58, 0.6), True: (0.93, 0.97, 0.99)}
 #: alternatives: so many, at pressures (MPa) so far apart, with angles (deg) so different or other numbers
 ALTERNATIVES, APART, DISTINCT = 3, 0.008, 3.0
 #: RMS of an alternative over the design's at which it takes its place
@@ -136,7 +139,7 @@ def search(
         raise InputError(f"objective = '{objective}' is not known: write {' or '.join(OBJECTIVES)}")
     tried, failed = [], None
     divisions = divided(target, pieces)
-    for material, parts in product(target.materials, divisions):
+    for material, parts in progress(list(product(target.materials, divisions)), "searches"):
         if len(target.materials) > 1:
             log.info(f"silicone {material.name}:")
         if len(divisions) > 1:
@@ -175,7 +178,7 @@ class _Search:
     def __init__(self, target, pieces, law, objective, most, mapping):
         self.mapping = mapping
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
-        self.optima = []
+        self.optima, self.pace = [], Pace()
         self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
         self.most = most if objective == PAIRED and not self.loaded else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
@@ -186,9 +189,10 @@ class _Search:
             problem, optimum = self._counted(optimised(replace(problem, aims=aims), self.floor))
         log.info(f"real-valued optimum: {_told(problem, optimum)}")
         self.real, self.whole = (problem, optimum), self._whole(problem, optimum)
-        log.info(f"whole chambers:      {_told(*self.whole)}")
+        _, after_whole, after_grid = OVER[self.loaded]
+        log.info(f"whole chambers:      {_told(*self.whole)}{self.pace.left(after_whole)}")
         self.best = self._cast(self.whole)
-        log.info(f"dimensions on grid:  {self.best}")
+        log.info(f"dimensions on grid:  {self.best}{self.pace.left(after_grid)}")
 
     def found(self, rivals):
         """The Found, with the best Candidates of other searches among the alternatives."""
@@ -235,7 +239,8 @@ class _Search:
         for number, found in enumerate(self.mapping(work, guesses[:STARTS]), start=1):
             self._keep(found)
             told = "no equilibrium" if found is None else _told(*found)
-            log.info(f"start {number} of at most {count}: {told}")
+            left = self.pace.left(OVER[self.loaded][0] * number / count)
+            log.info(f"start {number} of at most {count}: {told}{left}")
             best = min(self.optima, key=lambda found: found[1].cost, default=None)
             if best and best[1].cost < (GOOD_ENOUGH * self.target.length) ** 2:
                 break

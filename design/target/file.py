@@ -35,11 +35,11 @@ from pneunet.geometry.parameters import MOST_GROUPS, TWISTING, Segment
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
 
 #: file key -> field of Segment that the user may give a start value or let vary; kind, angle and chambers are
-#: found, and a bottom layer is no variable of the inverse design
+#: found, and a bottom layer and fillets, which the law does not know, are no variables of the inverse design
 START_KEYS = {
     key: f.name
     for key, f in quantities(Segment).items()
-    if f.metadata["unit"] == "mm" and f.name != "layer_thickness"
+    if f.metadata["unit"] == "mm" and f.name not in ("layer_thickness", "fillet")
 }
 SHARED = ("width", "channel_width", "channel_height", "cavity_floor", "end_margin")
 VARY_KEYS = {"angle_deg": "angle"} | {key: name for key, name in START_KEYS.items() if name not in SHARED}

@@ -1,12 +1,12 @@
 """Parametric CAD of a manipulator in gmsh's OpenCASCADE kernel.
 
-Recipe: parallelogram prisms from plan polygons, turned by the segment's roll; the outer solids of each
-segment fused; all cavities of a pressure group fused with their channel; everything fragmented, so that the
-boundary of the cavity volumes is the exact cavity surface. The cavities are then removed and the faces
-tagged.
+Recipe: chambers are parallelogram prisms from plan polygons, turned by the segment's roll; core and channel
+are polyhedra (geometry.ends), so that the body is the one of the grids. The outer solids of each segment
+fused; all cavities of a pressure group fused with their channel; everything fragmented, so that the boundary
+of the cavity volumes is the exact cavity surface. The cavities are then removed and the faces tagged.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,8 +16,11 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.system.interrupts import at_once, kept
 from pneunet.geometry import tags
+from pneunet.geometry.cad.polyhedra import bar_solid, channel_solid
+from pneunet.geometry.ends import Bar, PlacedSegment, placed
+from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.geometry.sections import channel_section
+from pneunet.geometry.sections import rotation
 
 _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
 
@@ -81,41 +84,68 @@ def fuse(tags: list[int], unify: bool) -> list[tuple[int, int]]:
     return gmsh.model.occ.fuse([(3, tags[0])], [(3, t) for t in tags[1:]])[0]
 
 
-def outer_solids(segment: Segment, start: float) -> list[int]:
-    """Volume tags of one segment's core and chamber blocks, not yet fused; x begins at `start` (mm)."""
-    s = segment
-    tags = [box(start, start + s.length, s.width / 2, s.core_bottom, s.core_top)]
-    for x in start + s.chamber_positions:
-        for side in s.sides:
-            # from the channel axis upwards: well inside the core, so that only the sides are coplanar
-            tags.append(chamber_block(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top))
-    return _rolled(s, tags)
+def outer_body(part: PlacedSegment) -> list[tuple[int, int]]:
+    """[(3, tag)] of one segment without its void: feet and tops of chambers' walls are rounded."""
+    s, solid = part.segment, fuse(outer_solids(part), unify=True)
+    half = s.chamber_thickness / 2 / s.sin
+    own = [
+        [x + end, 0.0, side * z]
+        for x in part.positions
+        for side in s.sides
+        for z in (s.core_top, s.chamber_top)
+        for end in (-half, half)
+    ]
+    middles = np.array(own) @ rotation(s).T if s.fillet else None
+    return rounded(solid, s.fillet, lambda middle: np.abs(middles - middle).max(axis=1).min() < _TOLERANCE)
 
 
-def cavity_solids(segment: Segment, start: float, channel_from: float, channel_to: float) -> list[int]:
-    """Volume tags of one segment's chamber cavities and its stretch of channel (clipped to the given x
-    range)."""
-    s = segment
-    tags = []
-    x0, x1 = max(start, channel_from), min(start + s.length, channel_to)
-    if x1 > x0:
-        tags.append(box(x0, x1, s.channel_width / 2, -s.channel_height / 2, s.channel_height / 2))
-    for x in start + s.chamber_positions:
-        for side in s.sides:
-            tags.append(
-                chamber_block(
-                    s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top
-                )
-            )
-    return _rolled(s, tags)
+def rounded(
+    solid: list[tuple[int, int]], radius: float, chosen: Callable[[np.ndarray], bool]
+) -> list[tuple[int, int]]:
+    """Volumes with the edges rounded whose middles (3,) are chosen; as they are where the radius (mm) is 0.
+    InputError where OpenCASCADE cannot do it."""
+    if not radius:
+        return solid
+    gmsh.model.occ.synchronize()
+    edges = {abs(e) for _, e in gmsh.model.getBoundary(_faces_of(solid), combined=False, oriented=False)}
+    found = sorted(e for e in edges if chosen(np.array(gmsh.model.occ.getCenterOfMass(1, e))))
+    try:
+        made = gmsh.model.occ.fillet([tag for _, tag in solid], found, [radius])
+    except Exception:  # gmsh raises plain Exception with its own text
+        made = []
+    if not made:
+        raise InputError(f"fillet_mm = {radius:g} cannot be built on this body: take a smaller one")
+    return [each for each in made if each[0] == 3]
 
 
-def layer_solid(segment: Segment, start: float, stop: float) -> list[int]:
-    """[volume tag] of the bottom layer between two x (mm); empty when the segment has none."""
-    if not segment.layer_thickness:
-        return []
-    solid = box(start, stop, segment.width / 2, segment.core_bottom, segment.layer_top)
-    return _rolled(segment, [solid])
+def _faces_of(solid):
+    return gmsh.model.getBoundary(solid, combined=False, oriented=False)
+
+
+def outer_solids(part: PlacedSegment) -> list[int]:
+    """Volume tags of one segment's core and chamber blocks, not yet fused."""
+    s = part.segment
+    # from the channel axis upwards: well inside the core, so that only the sides are coplanar
+    blocks = [
+        chamber_block(s, x, side, s.chamber_thickness, s.width / 2, 0.0, s.chamber_top)
+        for x in part.positions
+        for side in s.sides
+    ]
+    return [bar_solid(part.core), *_rolled(s, blocks)]
+
+
+def cavity_solids(part: PlacedSegment) -> list[int]:
+    """Volume tags of one segment's channel and chamber cavities, not yet fused."""
+    s = part.segment
+    cavities = [_rounded_cavity(s, x, side) for x in part.positions for side in s.sides]
+    return [channel_solid(part), *_rolled(s, cavities)]
+
+
+def _rounded_cavity(s, x, side):
+    """Before it is turned by the roll: all its edges are rounded but those of its floor."""
+    block = chamber_block(s, x, side, s.cavity_thickness, s.cavity_width / 2, s.cavity_floor, s.cavity_top)
+    floor = side * s.cavity_floor
+    return rounded([(3, block)], s.fillet, lambda middle: abs(middle[2] - floor) > _TOLERANCE)[0][1]
 
 
 def _rolled(segment: Segment, solids: list[int]) -> list[int]:
@@ -138,16 +168,13 @@ def build(manipulator: Manipulator) -> dict[str, float]:
     segment falls apart or a cavity breaks through.
     """
     occ = gmsh.model.occ
-    bodies, cavities, layers, number = [], [], [], []
-    for segment, start in zip(manipulator.segments, manipulator.starts):
-        bodies += fuse(outer_solids(segment, start), unify=True)
-        layers += [(3, tag) for tag in layer_solid(segment, start, start + segment.length)]
-    for group, start_stop in zip(manipulator.groups, manipulator.channels):
-        own = [
-            t
-            for i in group
-            for t in cavity_solids(manipulator.segments[i], manipulator.starts[i], *start_stop)
-        ]
+    parts = placed([snapped(s) for s in manipulator.segments])
+    bodies, cavities, number = [], [], []
+    for part in parts:
+        bodies += outer_body(part)
+    layers = [(3, bar_solid(part.layer)) for part in parts if part.layer]
+    for group in manipulator.groups:
+        own = [t for i in group for t in cavity_solids(parts[i])]
         # seams are kept: they separate the channel's wall from the chambers'
         cavities += (solids := fuse(own, unify=False))
         number += [len(set(number)) + 1] * len(solids)
@@ -190,19 +217,18 @@ def build(manipulator: Manipulator) -> dict[str, float]:
         for group, family in zip(number, parents[len(bodies) : inner])
         for _, t in gmsh.model.getBoundary(sorted(pieces([family])), combined=True, oriented=True)
     }
-    _tag_faces(manipulator, body_faces, {f: group_of_face[f] for f in cavity_faces})
+    _tag_faces(parts, body_faces, {f: group_of_face[f] for f in cavity_faces})
     occ.remove(cavity_volumes)
     occ.synchronize()
     return volumes
 
 
-def in_channel(segment: Segment, box: tuple[float, ...]) -> bool:
-    """Whether a cavity face with this bounding box (6 numbers) is a piece of the channel's wall (its ends are
-    not)."""
-    x0, y0, z0, x1, y1, z1 = box
-    (low_y, high_y), (low_z, high_z) = channel_section(segment) + [-_TOLERANCE, _TOLERANCE]
-    in_y, in_z = low_y < y0 and y1 < high_y, low_z < z0 and z1 < high_z
-    return in_y and in_z and x1 - x0 > 10 * _TOLERANCE
+def in_channel(channel: Bar, face: int) -> bool:
+    """Whether a face of a cavity is a piece of the channel's wall (its ends are not): then its centre lies on
+    the sides of the section there."""
+    x, *place = gmsh.model.occ.getCenterOfMass(2, face)
+    inwards = np.array([[1], [-1]]) * (place - channel.at(x).T)
+    return bool(abs(inwards.min()) < _TOLERANCE)
 
 
 def _tag_volumes(first, name, segments, volumes):
@@ -213,20 +239,20 @@ def _tag_volumes(first, name, segments, volumes):
         gmsh.model.setPhysicalName(3, first + i, f"{name} {i + 1}")
 
 
-def _tag_faces(manipulator, body_faces, group_of_face):
+def _tag_faces(parts, body_faces, group_of_face):
     """group_of_face: pressure group of each face of a cavity."""
-    names = tags.face_names(len(manipulator.groups))
+    names = tags.face_names(parts[-1].segment.group)
     groups = {tag: [] for tag in names}
+    starts = [part.start for part in parts]
     for face in sorted(body_faces):
-        x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(2, face)
+        x0, _, _, x1, _, _ = gmsh.model.getBoundingBox(2, face)
         if face in group_of_face:
-            i = int(np.clip(np.searchsorted(manipulator.starts, (x0 + x1) / 2) - 1, 0, None))
-            s = manipulator.segments[i]
+            i = int(np.clip(np.searchsorted(starts, (x0 + x1) / 2) - 1, 0, None))
             cavity, channel = tags.cavity_tags(group_of_face[face])
-            groups[channel if in_channel(s, (x0, y0, z0, x1, y1, z1)) else cavity].append(face)
+            groups[channel if in_channel(parts[i].channel, face) else cavity].append(face)
         elif x1 < _TOLERANCE:
             groups[tags.BASE].append(face)
-        elif x0 > manipulator.length - _TOLERANCE:
+        elif x0 > parts[-1].stop - _TOLERANCE:
             groups[tags.TIP].append(face)
         else:
             groups[tags.OUTER].append(face)

@@ -13,7 +13,10 @@ from pneunet.base.errors import InputError
 from pneunet.geometry import tags
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad.meshing import refuse_absurd, save, tetrahedral_mesh
+from pneunet.geometry.ends import Bar
+from pneunet.geometry.fillets import NO_CELL, refuse_fillets
 from pneunet.geometry.parameters import Segment
+from pneunet.geometry.sections import channel_section
 from pneunet.geometry.tags import AIR, GAP
 
 
@@ -33,6 +36,7 @@ def mesh_cell(
     to mesh_size; None = one size everywhere. InputError when there would be too many elements, the faces on
     the two cuts do not match or the mesh fails.
     """
+    refuse_fillets([segment], NO_CELL)
     half = segment.pitch / 2
     refuse_absurd(mesh_size, [(segment, segment.pitch, 1)])
     with cad.session("cell"):
@@ -76,7 +80,9 @@ def _build(segment, half, cut, gaps):
     for blocks, unify in ((outer, True), (inner, False)):
         slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
         solids.append(occ.intersect(cad.fuse(blocks, unify), [(3, slab)])[0])
-    layer = [(3, tag) for tag in cad.layer_solid(s, -half, half)]
+    layer = []
+    if s.layer_thickness:
+        layer.append((3, cad.box(-half, half, s.width / 2, s.core_bottom, s.layer_top)))
     medium = _gap_solids(s, half, centres[:-1] + s.pitch / 2) if gaps else []
     _, parents = occ.fragment(solids[0], solids[1] + layer + medium)
     occ.synchronize()
@@ -91,7 +97,8 @@ def _build(segment, half, cut, gaps):
         gmsh.model.addPhysicalGroup(3, medium, GAP)
     _make_periodic(half, s.pitch)
     interface = _boundary(body) & _boundary(air)
-    channel = [f for f in interface if cad.in_channel(s, gmsh.model.getBoundingBox(2, f))]
+    wall = Bar(np.array([-half, half]), np.array([channel_section(s)] * 2))
+    channel = [f for f in interface if cad.in_channel(wall, f)]
     gmsh.model.addPhysicalGroup(2, sorted(channel), tags.CHANNEL)
     gmsh.model.addPhysicalGroup(2, sorted(interface - set(channel)), tags.CAVITY)
     outer = [f for f in _boundary(body) - interface if not _on_cut(f, half)]

@@ -53,6 +53,23 @@ def tetrahedral_mesh() -> VolumeMesh:
     return VolumeMesh(points.reshape(-1, 3)[order], *elements(3, TETRAHEDRON, 4), *elements(2, TRIANGLE, 3))
 
 
+def cut_off() -> float:
+    """mm3 that flat facets cut off from, or add to, the curved faces of the current gmsh model: their areas
+    times the mean distance of the middles of their edges from the face."""
+    numbers, points, _ = gmsh.model.mesh.getNodes()
+    order, total = np.argsort(numbers), 0.0
+    for _, face in gmsh.model.getEntities(2):
+        if gmsh.model.getType(2, face) == "Plane":
+            continue
+        triangles = gmsh.model.mesh.getElementsByType(TRIANGLE, face)[1].reshape(-1, 3)
+        corners = points.reshape(-1, 3)[order][np.searchsorted(numbers[order], triangles)]
+        middles = (corners + np.roll(corners, 1, axis=1)) / 2
+        nearest = gmsh.model.getClosestPoint(2, face, middles.ravel())[0].reshape(middles.shape)
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        total += float(areas / 2 @ np.linalg.norm(nearest - middles, axis=2).mean(axis=1))
+    return total
+
+
 def save(path: Path, mesh: VolumeMesh, facts: dict[str, Any]) -> None:
     """Write the .npz `path` and, beside it, gmsh's file of the current model."""
     gmsh.option.setNumber("Mesh.Binary", 1)

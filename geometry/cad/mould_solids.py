@@ -4,6 +4,7 @@ Blocks reach beyond the planes at which they are cut, so that no faces of the op
 be helped.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import gmsh
@@ -11,6 +12,10 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.geometry.cad import body as cad
+from pneunet.geometry.cad.polyhedra import bar_solid, lofted, polyhedron
+from pneunet.geometry.ends import Bar, placed
+from pneunet.geometry.fillets import rounding
+from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.moulds.layers import Run
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator
@@ -23,6 +28,8 @@ DEPTH, BESIDE_A_CUT = 5.0, 16.0
 COVER = 0.8
 #: of the silicone's width that a vent may take
 VENT_SHARE = 0.7
+#: of a vent: its walls are planes, so that beside a tooth they count as no undercut
+_CIRCLE = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 2 * np.pi, 16, endpoint=False)])
 #: hole over tube
 TIGHT = 0.9
 
@@ -53,10 +60,15 @@ class MouldPiece:
         low = np.array([self.start, -self.half, z0])
         return low, np.array([self.stop, self.half, z1]) - low
 
+    def plate(self, plane: float) -> float:
+        """Thickness of a plate at a split plane, pockets for teeth under it."""
+        return self.moulds.plate + self.run.depth(plane)
+
     def silicone(self, z0: float, z1: float) -> np.ndarray:
         """(2, 3) corners of the box that the body takes of it between two heights."""
         x0, x1 = max(self.start, self.run.start), min(self.stop, self.run.stop)
-        return np.array([[x0, -self.run.half_width, z0], [x1, self.run.half_width, z1]])
+        y = self.run.half_width + self.run.grown(self.moulds)
+        return np.array([[x0, -y, z0], [x1, y, z1]])
 
     def within(self, volumes: list[tuple[int, int]], z0: float, z1: float) -> list[tuple[int, int]]:
         """What of volumes lies in it, where it is cut."""
@@ -76,15 +88,15 @@ class MouldPiece:
         return [(x, side * y) for x in ([a, b] if b - a > 2 * free else [(a + b) / 2]) for side in (-1, 1)]
 
 
-def frustum(low: np.ndarray, high: np.ndarray, z0: float, z1: float) -> int:
-    """Volume tag of what lies between two plan polygons (n, 2) with parallel sides, at heights z0 and z1."""
-    occ, n = gmsh.model.occ, len(low)
-    bottom, top = ([occ.addPoint(x, y, z) for x, y in plan] for plan, z in ((low, z0), (high, z1)))
-    rings = [[occ.addLine(r[i], r[(i + 1) % n]) for i in range(n)] for r in (bottom, top)]
-    posts = [occ.addLine(a, b) for a, b in zip(bottom, top)]
-    loops = [*rings, *([rings[0][i], posts[(i + 1) % n], rings[1][i], posts[i]] for i in range(n))]
-    faces = [occ.addPlaneSurface([occ.addCurveLoop(loop)]) for loop in loops]
-    return occ.addVolume([occ.addSurfaceLoop(faces, sewing=True)])
+def frustum(plan: Callable[[float], np.ndarray], heights: Sequence[float]) -> int:
+    """Volume tag of what lies between plan polygons (n, 2) with parallel sides at rising heights."""
+    points = np.array([np.column_stack([plan(z), np.full(len(plan(z)), z)]) for z in heights])
+    n = points.shape[1]
+    number = np.arange(points[..., 0].size).reshape(-1, n)
+    faces = [number[0].tolist(), number[-1].tolist()]
+    for low, high in zip(number, number[1:]):
+        faces += np.stack([low, np.roll(low, -1), np.roll(high, -1), high], axis=1).tolist()
+    return polyhedron(points.reshape(-1, 3), faces)
 
 
 def rounded(corners: np.ndarray, radius: float) -> np.ndarray:
@@ -110,6 +122,19 @@ def cylinder(
     return 3, gmsh.model.occ.addCylinder(*centre, *axis, diameter / 2)
 
 
+def upright(
+    bar: Bar, z0: float, z1: float | None = None, grown: Callable[[float], float] = lambda z: 0.0
+) -> int:
+    """Volume tag of what stands under a bar from z0 on, up to z1 or to its top, at a height wider by grown(z)
+    (mm) on either side."""
+    rings = []
+    for x, ((y0, y1), (_, top)) in zip(bar.x, bar.sections):
+        high = top if z1 is None else z1
+        a, b = grown(z0), grown(high)
+        rings.append([[x, y0 - a, z0], [x, y1 + a, z0], [x, y1 + b, high], [x, y0 - b, high]])
+    return lofted(np.array(rings))
+
+
 def _one(volumes):
     found = [tag for dim, tag in volumes if dim == 3]
     if len(found) != 1:
@@ -122,51 +147,102 @@ def _without(tag, tools):
 
 
 def outside(run: Run, plane: float, moulds: Moulds) -> list[tuple[int, int]]:
-    """The body without its void, from below `plane` up; fins between chambers have draft."""
-    tags = []
+    """The body without its void, from below `plane` up; its sides, and fins between chambers, have draft."""
+    tags, z0, highest = [], plane - 1, max(p.whole[1] for p in run.parts)
+
+    def grown(z):
+        return moulds.slope_outside * (highest - z)
+
     for p in run.parts:
-        s, z0 = p.segment, plane - 1
-        tags.append(cad.box(p.start, p.stop, s.width / 2, z0, p.core[1]))
+        s = p.segment
+        tags.append(upright(p.core, z0, grown=grown))
+        along, inset = rounding(s.fillet, CHORDS).T
+        feet, tops = s.core_top + s.fillet - along[::-1], s.chamber_top - s.fillet + along
+
+        def thickness(z, s=s, feet=feet, tops=tops, inset=inset):
+            more = np.interp(z, [*feet, *tops], [*inset[::-1], *-inset]) if s.fillet else 0.0
+            return s.chamber_thickness + 2 * moulds.slope * (s.chamber_top - z) + 2 * more
+
+        levels = np.unique([z0, *feet, *tops]) if s.fillet else [z0, s.chamber_top]
         for x in p.positions if 1 in p.sides else ():
-            low, high = (
-                cad.slanted_plan(x, s.chamber_thickness + 2 * grown, s.width / 2, s, 1)
-                for grown in (moulds.slope * (s.chamber_top - z0), 0.0)
-            )
-            tags.append(frustum(low, high, z0, s.chamber_top))
+
+            def plan(z, x=x, s=s, thickness=thickness):
+                return cad.slanted_plan(x, thickness(z), s.width / 2 + grown(z), s, 1)
+
+            tags.append(frustum(plan, levels))
     return cad.fuse(tags, unify=True)
 
 
 def void(run: Run, plane: float, top: float, below: float, moulds: Moulds) -> list[int]:
     """Volume tags of the channel and the chambers' cavities between `plane` and `top`, from `below` the plane
     on, thinner upwards by the draft."""
-    tags = []
+    tags, z0 = [], plane - below
     for p in run.parts:
-        s, z0 = p.segment, plane - below
+        s = p.segment
 
-        def add(stop, plan, z0=z0):
-            """plan(inset): the polygon, moved inwards."""
-            low, high = (plan(moulds.slope * (z - plane)) for z in (z0, stop))
-            tags.append(frustum(low, high, z0, stop))
+        def heights(roof):
+            return z0, top if np.isfinite(top) else max(roof, plane)
 
-        stop, (x0, x1) = min(s.channel_height / 2, top), p.channel
-        if stop > plane + 1e-9 and x1 > x0:
-
-            def channel(inset, x0=x0, x1=x1, half=s.channel_width / 2):
-                y = half - inset
-                return np.array([[x0, -y], [x1, -y], [x1, y], [x0, y]])
-
-            add(stop, channel)
+        tags.extend(_channel(p, plane, heights, lambda z: moulds.slope * (z - plane)))
         for side in p.sides:
             low, high = sorted((side * s.cavity_floor, side * s.cavity_top))
             if low > plane + 1e-9 or min(high, top) < plane + 1e-9:
                 continue
+            tips, inset = np.array([min(high, top)]), np.zeros(1)
+            if s.fillet and high <= top:
+                along, inset = rounding(s.fillet, CHORDS).T
+                tips = high - s.fillet + along
             for x in p.positions:
 
-                def cavity(inset, x=x, s=s, side=side):
-                    thickness, half = s.cavity_thickness - 2 * inset, s.cavity_width / 2 - inset
-                    return rounded(cad.slanted_plan(x, thickness, half, s, side), moulds.fillet)
+                def cavity(z, x=x, s=s, side=side, tips=tips, inset=inset):
+                    tip = float(np.interp(z, tips, inset))
+                    less = moulds.slope * (z - plane) + tip
+                    plan = cad.slanted_plan(
+                        x, s.cavity_thickness - 2 * less, s.cavity_width / 2 - less, s, side
+                    )
+                    # a corner that shrank to a point would be no polygon's
+                    radius = max(s.fillet - tip, s.fillet / 10) if s.fillet else moulds.fillet
+                    return rounded(plan, radius)
 
-                add(min(high, top), cavity)
+                tags.append(frustum(cavity, [z0, *tips]))
+    return tags
+
+
+def _channel(p, plane, heights, inset):
+    """Volume tags of a channel between each two sections: from and to heights(roof), inset(z) narrower;
+    where it is lower than 1e-9 mm above `plane` there is none."""
+    bar, tags = p.channel.cut_at(plane), []
+    rings = []
+    for x, ((y0, y1), (_, roof)) in zip(bar.x, bar.sections):
+        low, high = heights(roof)
+        a, b = inset(low), inset(high)
+        rings.append(np.array([[x, y0 + a, low], [x, y1 - a, low], [x, y1 - b, high], [x, y0 + b, high]]))
+    for i, lean in zip((0, -1), p.leans):
+        rings[i][:, 0] += lean * rings[i][:, 1]
+    for a, b in zip(rings, rings[1:]):
+        if max(a[2, 2], b[2, 2]) > plane + 1e-9:
+            tags.append(lofted(np.array([a, b])))
+    return tags
+
+
+def teeth(run: Run, plane: float, moulds: Moulds) -> list[int]:
+    """Volume tags of what the layer above `plane` has below it (geometry.moulds.layers.Run.depth), from above
+    the plane on; as much narrower as the core that leaves room for it."""
+    spread = run.planes[-1] - run.planes[0]
+    tags = []
+    for p in run.parts:
+        bar = p.channel.cut_at(plane)
+        for i in np.flatnonzero(np.diff(bar.x) > 0):
+            part = Bar(bar.x[i : i + 2], bar.sections[i : i + 2])
+            if part.sections[:, 1, 1].min() > plane - 1e-9:
+                continue
+            rings = []
+            for x, ((y0, y1), (_, roof)) in zip(part.x, part.sections):
+                a, b = (moulds.slope * (plane - z + spread) for z in (roof, plane + 1))
+                rings.append(
+                    [[x, y0 + a, roof], [x, y1 - a, roof], [x, y1 - b, plane + 1], [x, y0 + b, plane + 1]]
+                )
+            tags.append(lofted(np.array(rings)))
     return tags
 
 
@@ -199,19 +275,18 @@ def _joints(piece, z0, z1):
 
 def plate_with_cores(piece: MouldPiece, plane: float) -> int:
     """Below `plane`, with the cores."""
-    m = piece.moulds
-    tag = _with(piece.block(plane - m.plate, plane), piece, plane, np.inf, m.plate / 2)
-    through = (0, 0, m.plate + 1)
+    m, thick = piece.moulds, piece.plate(plane)
+    tag = _with(piece.block(plane - thick, plane), piece, plane, np.inf, m.plate / 2)
     holes = [
-        cylinder((x, y, plane - m.plate - 1), (0, 0, m.plate + 2), m.dowel + m.clearance)
+        cylinder((x, y, plane - thick - 1), (0, 0, thick + 2), m.dowel + m.clearance)
         for x, y in piece.dowels()
     ]
     holes += [
-        cylinder((x, y, plane - m.plate - 1), through, diameter)
+        (3, frustum(lambda z, x=x, y=y, d=diameter: [x, y] + d / 2 * _CIRCLE, [plane - thick - 1, plane]))
         for x, y, diameter in vents(piece.run, m.vent)
         if piece.start + m.vent < x < piece.stop - m.vent
     ]
-    return _without(tag, holes)
+    return _without(tag, holes + [(3, t) for t in teeth(piece.run, plane, m)])
 
 
 def vents(run: Run, diameter: float) -> list[tuple[float, float, float]]:
@@ -234,7 +309,8 @@ def vents(run: Run, diameter: float) -> list[tuple[float, float, float]]:
 def frame(piece: MouldPiece, low: float, high: float) -> int:
     """Around a middle layer; open at `high`."""
     m = piece.moulds
-    boxes = [cad.box(p.start, p.stop, p.segment.width / 2, low, high + 1) for p in piece.run.parts]
+    slope = m.slope_outside
+    boxes = [upright(p.core, low, high + 1, lambda z: slope * (z - low)) for p in piece.run.parts]
     tag = _without(
         piece.block(low - m.floor, high), cad.fuse(boxes, unify=True) + _joints(piece, low - m.floor, high)
     )
@@ -255,32 +331,34 @@ def _with(tag, piece, plane, top, below):
 
 def core_tops(run: Run, plane: float) -> list[float]:
     """Heights to which the cores above `plane` reach."""
-    tops = [p.segment.channel_height / 2 for p in run.parts if p.channel[1] > p.channel[0]]
+    tops = [float(p.channel.sections[:, 1, 1].max()) for p in run.parts]
     tops += [p.segment.cavity_top for p in run.parts if 1 in p.sides]
     return [z for z in tops if z > plane + 1e-9]
 
 
-def trough(rooms: np.ndarray, piece: MouldPiece, top: float, ports: list[tuple[float, int]]) -> int:
-    """A jig: rooms (n, 5) of x0, x1, y0, y1, lowest z, open at `top`; guides for the ports' tubes."""
-    m, low = piece.moulds, rooms[:, 4].min() - piece.moulds.floor
+def trough(rooms: list[Bar], piece: MouldPiece, top: float, ports: list[tuple[float, int]]) -> int:
+    """A jig: rooms from their lowest z up, open at `top`; guides for the ports' tubes."""
+    m, low = piece.moulds, lowest(rooms) - piece.moulds.floor
     tag = piece.block(low, top)
-    boxes = [
-        gmsh.model.occ.addBox(x0, y0, z0, x1 - x0, y1 - y0, top + 1 - z0) for x0, x1, y0, y1, z0 in rooms
-    ]
-    tools = cad.fuse(boxes, unify=True) + _joints(piece, low, top)
+    tools = cad.fuse([bar_solid(room) for room in rooms], unify=True) + _joints(piece, low, top)
     for x, side in ports:
         if piece.start < x < piece.stop:
             tools.append(cylinder((x, side * (piece.half + 1), 0), (0, -side * (piece.half + 1), 0), m.port))
     return _without(tag, tools)
 
 
+def lowest(rooms: list[Bar]) -> float:
+    """Lowest z of rooms."""
+    return min(float(room.sections[:, 1, 0].min()) for room in rooms)
+
+
 def body_solid(manipulator: Manipulator, moulds: Moulds, ports: bool = True) -> int:
     """Volume tag of the body in one piece, with the holes for its tubes if asked."""
     m, tools = manipulator, []
-    outer = [t for s, x in zip(m.segments, m.starts) for t in cad.outer_solids(s, x)]
-    for group, channel in zip(m.groups, m.channels):
-        own = [t for i in group for t in cad.cavity_solids(m.segments[i], m.starts[i], *channel)]
-        tools += cad.fuse(own, unify=False)
+    row = placed([snapped(s, lowest=0.0) for s in m.segments], castable=True)
+    outer = [tag for part in row for _, tag in cad.outer_body(part)]
+    for group in m.groups:
+        tools += cad.fuse([t for i in group for t in cad.cavity_solids(row[i])], unify=False)
     if ports:
         for x in m.ports:
             s = m.segments[int(np.searchsorted(m.starts, x, side="right")) - 1]

@@ -14,15 +14,17 @@ import gmsh
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.system.progress import progress
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.cad import mould_solids as solids
 from pneunet.geometry.cad.meshing import TRIANGLE, write_model
 from pneunet.geometry.cad.mould_solids import MouldPiece
+from pneunet.geometry.ends import Bar, placed
 from pneunet.geometry.moulds.layers import LOWER, MIDDLE, UPPER, Run, runs
 from pneunet.geometry.moulds.parameters import Moulds, printed
 from pneunet.geometry.moulds.part import Part
 from pneunet.geometry.parameters import Manipulator
-from pneunet.geometry.sections import core_section, whole_section
+from pneunet.geometry.sections import whole_section
 
 OVER = np.diag([1.0, -1.0, -1.0, 1.0])  # half a turn about x
 
@@ -125,7 +127,7 @@ def mould_parts(manipulator: Manipulator, moulds: Moulds, folder: Path | None = 
     forms.append(_pin(moulds, sum(_dowels(run, moulds) for run in found)))
     for form in forms:
         _refuse_larger(form, moulds)
-    for form in forms:
+    for form in progress(forms, "parts to print"):
         yield form.part(folder / f"{form.name}.step" if folder else None)
 
 
@@ -167,7 +169,7 @@ def _closed(piece, name, named, frames):
     """Tray and plate of what lies above the highest plane of a piece's run."""
     m, run = piece.moulds, piece.run
     plane, top = run.planes[-1], max(p.whole[1] for p in run.parts)
-    silicone = piece.silicone(plane, top)
+    silicone = piece.silicone(plane - run.depth(plane), top)
     low, size = piece.bounds(plane, top + m.floor)
     does = f"outside of the {name} layer"
     yield _Form(
@@ -181,7 +183,7 @@ def _closed(piece, name, named, frames):
         silicone,
     )
     highest = max(solids.core_tops(run, plane), default=plane)
-    low, size = piece.bounds(plane - m.plate, highest)
+    low, size = piece.bounds(plane - piece.plate(plane), highest)
     does = f"cores of the {name} layer, lid of its tray"
     build = lambda: solids.plate_with_cores(piece, plane)  # noqa: E731
     yield _Form(named(f"{name}-plate"), does, build, low, size, frames, False, silicone)
@@ -201,40 +203,48 @@ def _open(piece, named, frame):
 
 
 def _jig(piece, named, frame):
-    run, c = piece.run, piece.moulds.clearance
-    rooms = np.array(
-        [[p.start, p.stop, -p.segment.width / 2 - c, p.segment.width / 2 + c, p.whole[0]] for p in run.parts]
-    )
-    rooms[0, 0] -= c
-    rooms[-1, 1] += c
-    top = max(p.core[1] for p in run.parts)
+    run, c = piece.run, piece.moulds.clearance + piece.run.grown(piece.moulds)
+    rooms = []
+    top = max(float(p.core.sections[:, 1, 1].max()) for p in run.parts)
+    for p in run.parts:
+        sections = p.core.sections + [[-c, c], [0.0, 0.0]]
+        sections[:, 1] = p.whole[0], top + 1
+        rooms.append(Bar(p.core.x.copy(), sections))
+    _widen(rooms, c)
     ports = [port for p in run.parts for port in p.ports]
     does = "holds the layers while they are bonded; guides for the tubes"
-    bounds = piece.bounds(rooms[:, 4].min() - piece.moulds.floor, top)
+    bounds = piece.bounds(solids.lowest(rooms) - piece.moulds.floor, top)
     return _Form(named("jig"), does, lambda: solids.trough(rooms, piece, top, ports), *bounds, (frame,))
 
 
 def _assembly(large, found, moulds):
     """Troughs in which runs of different planes are joined end to end, in the body's axes."""
-    c, sections = moulds.clearance, [whole_section(s) for s in large.segments]
-    rooms = np.array(
-        [
-            [x, x + s.length, y0 - c, y1 + c, z0]
-            for x, s, ((y0, y1), (z0, _)) in zip(large.starts, large.segments, sections)
-        ]
-    )
-    rooms[0, 0] -= c
-    rooms[-1, 1] += c
-    top = max(core_section(s)[1, 1] for s in large.segments)
+    c = moulds.clearance + max(run.grown(moulds) for run in found)
+    row = placed(large.segments, castable=True)
+    top = max(float(part.core.sections[:, 1, 1].max()) for part in row)
+    rooms = []
+    for part in row:
+        # chambers that point sideways reach beyond the core
+        all_of_it = np.concatenate([part.core.sections, [whole_section(part.segment)]])
+        (y0, y1), (z0, _) = ([section.min(), section.max()] for section in np.moveaxis(all_of_it, 1, 0))
+        section = [[y0 - c, y1 + c], [z0, top + 1]]
+        rooms.append(Bar(np.array([part.start, part.stop]), np.array([section] * 2)))
+    _widen(rooms, c)
     joined = Run(tuple(p for run in found for p in run.parts), (0.0,), 0, 0)
-    half = float(np.abs(rooms[:, 2:4]).max()) - c
+    half = max(float(np.abs(room.sections[:, 0]).max()) for room in rooms) - c
     pieces = [MouldPiece(joined, p.start, p.stop, moulds, half) for p in _pieces(joined, moulds)]
     for i, piece in enumerate(pieces, start=1):
         name = "assembly-jig" + f"-{i}" * (len(pieces) > 1)
         does = "holds the cast runs while they are joined end to end"
-        bounds = piece.bounds(rooms[:, 4].min() - moulds.floor, top)
+        bounds = piece.bounds(solids.lowest(rooms) - moulds.floor, top)
         build = lambda piece=piece: solids.trough(rooms, piece, top, [])  # noqa: E731
         yield _Form(name, does, build, *bounds, (np.eye(4),))
+
+
+def _widen(rooms, clearance):
+    """Rooms in a row, the first and the last as much longer."""
+    rooms[0].x[0] -= clearance
+    rooms[-1].x[-1] += clearance
 
 
 def _pin(moulds, count):

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneunet.geometry import tags
+from pneunet.geometry.ends import End, ends_of, joined
 from pneunet.geometry.grids.cell import contents
-from pneunet.geometry.grids.planes import SNAP, Planes, along, lean, sideways, snapped, upright
+from pneunet.geometry.grids.planes import Planes, along, lean, sideways, snapped, upright
 from pneunet.geometry.grids.tensor import AIR_OF_GROUP, CHANNEL_AIR, EMPTY, TensorGrid
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.geometry.sections import rotation
@@ -23,15 +24,9 @@ from pneunet.geometry.sections import rotation
 def body_grid(manipulator: Manipulator, size: float) -> TensorGrid:
     """The body, elements in its active parts at most `size` mm along x, y and z."""
     segments = [snapped(s) for s in manipulator.segments]
-    closed = [True, *(a.group != b.group for a, b in zip(segments, segments[1:])), True]
     parts = [
-        _Part(
-            tags.BODY + i,
-            start,
-            _Section(s, size),
-            tuple(End.of(s, joint, closed[i + j]) for j, joint in enumerate((i > 0, i + 1 < len(segments)))),
-        )
-        for i, (s, start) in enumerate(zip(segments, manipulator.starts))
+        _Part(tags.BODY + i, start, _Section(s, size), ends)
+        for i, (s, start, ends) in enumerate(zip(segments, manipulator.starts, ends_of(segments)))
     ]
     counts = np.max([part.section.counts for part in parts], axis=0)
     for part in parts:
@@ -44,44 +39,6 @@ def body_grid(manipulator: Manipulator, size: float) -> TensorGrid:
     return TensorGrid(
         np.concatenate(layers), np.concatenate(contents_), {(0, -1): tags.BASE, (0, 1): tags.TIP}
     )
-
-
-@dataclass(frozen=True)
-class End:
-    """A passive end, in distances (mm) on the axis from the segment's own end: up to `flat` all planes are
-    flat and the levels move to the neighbour's, up to `wall` the lean grows to the outermost chamber's; up to
-    `solid` there is no channel, 0 where it runs on into the neighbour."""
-
-    flat: float
-    wall: float
-    solid: float
-
-    @classmethod
-    def of(cls, segment: Segment, joint: bool, closed: bool) -> "End":
-        """That of a segment which ends at a joint or freely, its channel closed or not."""
-        s = segment
-        flat = s.end_margin / 2 if joint else 0.0
-        solid = s.end_wall if closed else 0.0
-        if not s.sides:
-            return cls(flat, flat, solid)
-        if joint and closed and abs(solid - flat) < SNAP:
-            flat = solid - SNAP
-        return cls(flat, s.end_length, solid)
-
-    @property
-    def planes(self) -> list[float]:
-        """Distances at which planes must stand."""
-        return [0.0, self.flat, self.wall, self.solid]
-
-    def slant(self, distance: np.ndarray) -> np.ndarray:
-        """How much of the chambers' lean planes have, 0 to 1."""
-        if self.wall == self.flat:
-            return np.zeros_like(distance)
-        return np.clip((distance - self.flat) / (self.wall - self.flat), 0, 1)
-
-    def taper(self, distance: np.ndarray) -> np.ndarray:
-        """How far levels have moved to those of the joint, 0 to 1."""
-        return np.clip(1 - distance / self.flat, 0, 1) if self.flat else np.zeros_like(distance)
 
 
 class _Axis:
@@ -203,10 +160,9 @@ class _Part:
         return points, kinds
 
     def _joint(self, other, axis, own_end, other_end):
-        """Levels of the core at the joint: the longer taper keeps more of its own, which keeps the volume of
-        the step."""
-        (a, la), (b, lb) = (
-            (part.section.levels[axis][part.section.core[axis]], end.flat)
+        """Levels of the core at the joint."""
+        (a, first), (b, second) = (
+            (part.section.levels[axis][part.section.core[axis]], end)
             for part, end in ((self, own_end), (other, other_end))
         )
-        return (a * la + b * lb) / (la + lb)
+        return joined(a, first, b, second)

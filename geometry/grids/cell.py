@@ -4,6 +4,7 @@ rest."""
 import numpy as np
 
 from pneunet.geometry import tags
+from pneunet.geometry.fillets import NO_CELL, refuse_fillets
 from pneunet.geometry.grids.planes import along, lean, sideways, snapped, upright
 from pneunet.geometry.grids.tensor import CAVITY_AIR, CHANNEL_AIR, EMPTY, TensorGrid
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING, Segment
@@ -22,6 +23,7 @@ def cell_grid(
     gaps: the room between the chambers is meshed too. part: only xi >= 0, and of a twisting cell only y >= 0:
     HALF_TURNS make the rest.
     """
+    refuse_fillets([segment], NO_CELL)
     s = snapped(segment)
     twisting = s.kind == TWISTING
     xi = along(s).divided(size, layer)

@@ -18,13 +18,14 @@ LOWEST_RISE = 0.05
 _SAME = 1e-9
 
 
-def snapped(segment: Segment) -> Segment:
+def snapped(segment: Segment, lowest: float = SNAP / 2) -> Segment:
     """The segment whose planes are one or `SNAP` apart, but for the walls and cavities that the dimensions
     ask for themselves.
 
     A cavity's floor moves to the channel's floor or ceiling, a channel as wide as the cavity is nearly
-    becomes as wide, a cavity's ceiling moves to the top of the channel or of the core. Most segments stay as
-    they are.
+    becomes as wide, a cavity's ceiling moves to the top of the channel or of the core. A twisting segment's
+    floors that are closer to the axis than half of SNAP move to `lowest`: a grid needs some room between
+    them, a mould none. Most segments stay as they are.
     """
     s = segment
     if not s.sides:
@@ -32,7 +33,8 @@ def snapped(segment: Segment) -> Segment:
     half = s.channel_height / 2
     floor = next((to for to in (half, -half) if abs(s.cavity_floor - to) < SNAP), s.cavity_floor)
     if s.kind == TWISTING:
-        floor = half if half - s.cavity_floor < SNAP else max(s.cavity_floor, SNAP / 2)
+        floor = lowest if s.cavity_floor < SNAP / 2 else s.cavity_floor
+        floor = half if half - s.cavity_floor < SNAP else floor
     s = _with_floor(s, floor)
     if 0 < s.cavity_width - s.channel_width < 2 * SNAP:
         s = replace(s, channel_width=s.cavity_width)

@@ -17,23 +17,31 @@ from functools import cached_property
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.geometry.ends import Bar, placed
+from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.moulds.parameters import Moulds
-from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Manipulator, Segment
+from pneunet.geometry.sections import rotation
 
 #: mm; floors at one height
 SAME = 1e-9
+#: half a turn about x
+OVER = np.diag([1.0, -1.0, -1.0])
 UPPER, MIDDLE, LOWER = "upper", "middle", "lower"
 
 
 @dataclass(frozen=True)
 class RunMember:
-    """A segment in a run's frame: from x = start on; its channel between two x, empty where there is none;
-    ports: [(x, side of y from which the tube comes)]. All mm."""
+    """A segment in a run's frame, from x = start on: its core, channel and bottom layer; leans: dx / dy of
+    the channel's ends; ports: [(x, side of y from which the tube comes)]. All mm."""
 
     segment: Segment
     start: float
     up: bool
-    channel: tuple[float, float]
+    core: Bar
+    channel: Bar
+    layer: Bar | None
+    leans: tuple[float, float]
     ports: tuple[tuple[float, int], ...] = ()
 
     @property
@@ -46,16 +54,11 @@ class RunMember:
         return tuple(side if self.up else -side for side in self.segment.sides)
 
     @property
-    def core(self) -> tuple[float, float]:
-        """Lowest and highest z of the core."""
-        s = self.segment
-        return (s.core_bottom, s.core_top) if self.up else (-s.core_top, -s.core_bottom)
-
-    @property
     def whole(self) -> tuple[float, float]:
         """Lowest and highest z of all."""
-        s = self.segment
-        return (s.chamber_bottom, s.chamber_top) if self.up else (-s.chamber_top, -s.chamber_bottom)
+        s, z = self.segment, self.core.sections[:, 1]
+        low, high = (s.chamber_bottom, s.chamber_top) if self.up else (-s.chamber_top, -s.chamber_bottom)
+        return min(low, float(z.min())), max(high, float(z.max()))
 
     @property
     def positions(self) -> np.ndarray:
@@ -64,7 +67,15 @@ class RunMember:
 
     def turned(self) -> "RunMember":
         """The same, turned by half a turn about x."""
-        return replace(self, up=not self.up, ports=tuple((x, -side) for x, side in self.ports))
+        return replace(
+            self,
+            up=not self.up,
+            core=self.core.turned(OVER),
+            channel=self.channel.turned(OVER),
+            layer=self.layer and self.layer.turned(OVER),
+            leans=(-self.leans[0], -self.leans[1]),
+            ports=tuple((x, -side) for x, side in self.ports),
+        )
 
 
 @dataclass(frozen=True)
@@ -87,7 +98,7 @@ class Run:
 
     @property
     def half_width(self) -> float:
-        return max(p.segment.width for p in self.parts) / 2
+        return max(float(np.abs(p.core.sections[:, 0]).max()) for p in self.parts)
 
     @property
     def turned(self) -> "Run":
@@ -100,9 +111,22 @@ class Run:
         """Whether half a turn about x changes nothing, so that one mould makes the upper and the lower
         layer."""
         return abs(self.planes[0] + self.planes[-1]) < SAME and all(
-            p.segment.kind == TWISTING or not p.sides and np.allclose(p.core, p.turned().core)
+            p.segment.kind in (TWISTING, PASSIVE)
+            and all(
+                np.allclose(bar.sections, bar.turned(OVER).sections, atol=SAME) for bar in (p.core, p.channel)
+            )
             for p in self.parts
         )
+
+    def grown(self, moulds: Moulds) -> float:
+        """By how much (mm) draft widens the sides of its layers at most."""
+        z = [min(p.whole[0] for p in self.parts), *self.planes, max(p.whole[1] for p in self.parts)]
+        return moulds.slope_outside * float(np.diff(z).max())
+
+    def depth(self, plane: float) -> float:
+        """How far (mm) the channel's roof dips below a split plane where it goes over to a lower one. There
+        the layer above reaches down as teeth, which close the grooves of the layer below."""
+        return max(0.0, *(plane - float(p.channel.sections[:, 1, 1].min()) for p in self.parts))
 
     @cached_property
     def layers(self) -> tuple["Layer", ...]:
@@ -133,13 +157,12 @@ class Layer:
     def volumes(self) -> dict[str, float]:
         """{name of the silicone: mm3}, no waste."""
         out: dict[str, float] = {}
-        for placed in self.run.parts:
-            s = placed.segment
-            whole = body_volume(placed, self.z0, self.z1)
+        for part in self.run.parts:
+            s = part.segment
+            whole = body_volume(part, self.z0, self.z1)
             stiff = 0.0
-            if s.layer_thickness:
-                low, high = (s.core_bottom, s.layer_top) if placed.up else (-s.layer_top, -s.core_bottom)
-                stiff = s.length * s.width * _common((low, high), (self.z0, self.z1))
+            if part.layer:
+                stiff = part.layer.volume(self.z0, self.z1)
                 assert s.layer_material is not None
                 out[s.layer_material.name] = out.get(s.layer_material.name, 0.0) + stiff
             out[s.material.name] = out.get(s.material.name, 0.0) + whole - stiff
@@ -166,7 +189,8 @@ def runs(manipulator: Manipulator, split: float | None = None) -> tuple[Run, ...
         if not (kept and _together([manipulator.segments[j] for j in kept[-1]], s)):
             kept.append([])
         kept[-1].append(i)
-    return tuple(_run(manipulator, indices, split) for indices in kept)
+    row = placed([snapped(s, lowest=0.0) for s in manipulator.segments], castable=True)
+    return tuple(_run(manipulator, row, indices, split) for indices in kept)
 
 
 def _together(before, s):
@@ -176,18 +200,20 @@ def _together(before, s):
     )
 
 
-def _run(manipulator, indices, split):
-    segments = [manipulator.segments[i] for i in indices]
-    turn = segments[0].roll % 180
+def _run(manipulator, row, indices, split):
+    turn = row[indices[0]].segment.roll % 180
+    to_run = rotation(replace(row[indices[0]].segment, roll=turn)).T
     ports = manipulator.ports
     parts = []
-    for i, s in zip(indices, segments):
-        start, up = float(manipulator.starts[i]), s.roll == turn
-        low, high = manipulator.channels[s.group - 1]
-        channel = max(start, float(low)), min(start + s.length, float(high))
+    for i in indices:
+        s, start = row[i].segment, row[i].start
+        up = s.roll == turn
         mine = float(ports[s.group - 1])
         own = s.chambers and start <= mine < start + s.length
-        parts.append(RunMember(s, start, up, channel, ((mine, -1 if up else 1),) if own else ()))
+        bars = [bar and bar.turned(to_run) for bar in (row[i].core, row[i].channel, row[i].layer)]
+        first, last = (slant * s.cot * (1 if up else -1) for slant in row[i].slants)
+        guides = ((mine, -1 if up else 1),) if own else ()
+        parts.append(RunMember(s, start, up, *bars, (first, last), guides))
     planes = sorted({p.segment.cavity_floor * side for p in parts for side in p.sides}) or [0.0]
     if planes[-1] - planes[0] < SAME:
         planes = planes[:1]
@@ -214,21 +240,17 @@ def _chosen(parts, planes, split):
     return split if up else -split
 
 
-def body_volume(placed: RunMember, z0: float = -np.inf, z1: float = np.inf) -> float:
+def body_volume(part: RunMember, z0: float = -np.inf, z1: float = np.inf) -> float:
     """mm3 of silicone of a segment between two heights of its run."""
-    s, inside = placed.segment, (z0, z1)
-    volume = s.length * s.width * _common(placed.core, inside)
+    s, inside = part.segment, (z0, z1)
+    volume = part.core.volume(z0, z1) - part.channel.volume(z0, z1)
     per_width = s.chambers / s.sin
-    channel = (-s.channel_height / 2, s.channel_height / 2)
-    x0, x1 = placed.channel
-    volume -= max(x1 - x0, 0.0) * s.channel_width * _common(channel, inside)
-    for side in placed.sides:
+    for side in part.sides:
 
         def span(low, high, side=side):
             return (low, high) if side > 0 else (-high, -low)
 
-        core = placed.core[1] if side > 0 else -placed.core[0]
-        volume += per_width * s.chamber_thickness * s.width * _common(span(core, s.chamber_top), inside)
+        volume += per_width * s.chamber_thickness * s.width * _common(span(s.core_top, s.chamber_top), inside)
         cavity = span(s.cavity_floor, s.cavity_top)
         volume -= per_width * s.cavity_thickness * s.cavity_width * _common(cavity, inside)
         shared = span(s.cavity_floor, s.channel_height / 2)

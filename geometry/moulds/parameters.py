@@ -6,6 +6,7 @@ import numpy as np
 
 from pneunet.base.errors import InputError
 from pneunet.base.quantities import Checked, quantities, quantity
+from pneunet.geometry.grids.planes import snapped
 from pneunet.geometry.parameters import OF_CHAMBERS, Manipulator, Segment
 
 #: mm: what a printer still prints as a fin
@@ -22,8 +23,15 @@ class Moulds(Checked):
     draft: float = quantity(
         "deg", 0.0, "of cores, ridges and fins: walls grow thicker towards the tips", low=0, high=5
     )
+    draft_outside: float = quantity(
+        "deg",
+        0.0,
+        "of the body's sides: it grows wider towards the planes at which it is split",
+        low=0,
+        high=5,
+    )
     clearance: float = quantity("mm", 0.15, "dowels in holes, body in the jig", low=0, high=1)
-    fillet: float = quantity("mm", 0.0, "radius of the upright edges of the chambers' cores", low=0, high=5)
+    fillet: float = quantity("mm", 0.0, "radius of the upright edges of sharp chambers' cores", low=0, high=5)
     split: float | None = quantity(
         "mm",
         None,
@@ -54,6 +62,11 @@ class Moulds(Checked):
         return float(np.tan(np.radians(self.draft)))
 
     @property
+    def slope_outside(self) -> float:
+        """Of the body's sides."""
+        return float(np.tan(np.radians(self.draft_outside)))
+
+    @property
     def split_as_printed(self) -> float | None:
         """The split, in moulds as large as `printed`."""
         return None if self.split is None else self.split / (1 - self.shrinkage)
@@ -63,9 +76,8 @@ def printed(manipulator: Manipulator, moulds: Moulds) -> Manipulator:
     """The manipulator as large as its moulds must be, so that it is right when the silicone has shrunk.
     InputError where a parameter of the moulds does not go with the body."""
     scale = 1 / (1 - moulds.shrinkage)
-    segments = [
-        replace(s, **{name: scale * getattr(s, name) for name in _lengths(s)}) for s in manipulator.segments
-    ]
+    castable = [snapped(s, lowest=0.0) for s in manipulator.segments]
+    segments = [replace(s, **{name: scale * getattr(s, name) for name in _lengths(s)}) for s in castable]
     for i, s in enumerate(segments, start=1):
         _check(f"segment {i}", s, moulds)
     return Manipulator(tuple(segments))
@@ -97,8 +109,8 @@ def _check(where: str, s: Segment, moulds: Moulds) -> None:
             f"draft_deg = {moulds.draft:g}: fins and cores of {where} would be thinner than {THINNEST_FIN:g}"
             " mm at their tips: take less"
         )
-    if 2 * moulds.fillet > tip - 0.01:
+    radius = max(moulds.fillet, s.fillet)
+    if 2 * radius > tip - 0.01:
         raise InputError(
-            f"fillet_mm = {moulds.fillet:g}: must be less than half of the cores of {where}, {tip:.3g} mm"
-            " thick"
+            f"fillet_mm = {radius:g}: must be less than half of the cores of {where}, {tip:.3g} mm thick"
         )

@@ -26,7 +26,6 @@ from pneunet.geometry.meshfile import read_mesh
 from pneunet.geometry.parameters import Segment
 from pneunet.hifi.cell.symmetry import Orbits, SymmetryClass, characters, group, windows
 from pneunet.hifi.contact.cell import CellContact
-from pneunet.hifi.contact.gaps import Contact
 from pneunet.hifi.contact.medium import ThirdMedium
 from pneunet.hifi.contact.penalty import WallPenalty
 from pneunet.hifi.contact.walls import CellWalls, WallContact
@@ -66,8 +65,8 @@ class CellProblem(MixedField):
         contact: WallPenalty | None = None,
     ):
         part = not isinstance(mesh, tuple) and bool(read_mesh(mesh)[1].get("part"))
-        if part and (contact or medium):
-            raise ValueError("contact needs the whole cell")
+        if part and medium:
+            raise ValueError("a medium needs the whole cell")
         super().__init__(*(mesh if isinstance(mesh, tuple) else compat.read_mesh(mesh, MPI.COMM_SELF)))
         self.segment, self._gauge_of, self._penalty = segment, (gauge, centre), contact
         #: (g, 3) diagonals of the rotations that make the cell of the mesh
@@ -93,11 +92,7 @@ class CellProblem(MixedField):
         for each in self.classes:
             each.define_gauge(over, self._gauge_of[1])
         self.walls = CellWalls(self)
-        self.contact = (
-            CellContact(self, self.walls, self._penalty)
-            if self._penalty
-            else Contact(MPI.COMM_SELF, self.unknowns + 6, slice(0, self.unknowns + 6))
-        )
+        self.contact = CellContact(self, self.walls, self._penalty)
 
     # ---- the class in which states are
     @property
@@ -193,7 +188,7 @@ class CellProblem(MixedField):
     def residual(self) -> tuple[np.ndarray, np.ndarray]:
         """(dPi/du,p (unknowns,), dPi/d(e,k) (6,)) at the current state, strains and pressure."""
         forces = self.classes[0].collected(self.vector(self._potential.residuals))
-        slope = self._strains_of(self._slope)
+        slope = self._strains_of(self._slope) * self.classes[0].strains
         pushing = self.contact.residual()
         return forces + pushing[:-6], slope + pushing[-6:]
 
@@ -201,16 +196,18 @@ class CellProblem(MixedField):
         """(bordered matrix as CSR, d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6)); rows and columns of
         strains of other classes are zero."""
         self.assemble(self._matrix, self._potential.tangents)
-        n, touching = self.unknowns, self.contact.tangent()
-        inner = touching[:n, :n].tocoo()
-        matrix = self.classes[0].bordered(self._matrix, inner.row, inner.col, inner.data)
-        mixed, curvature = self._by_strains(self.classes[0])
-        return matrix, mixed + touching[:n, n:].toarray(), curvature + touching[n:, n:].toarray()
+        return self._second_derivatives(self.classes[0], self.contact.tangent())
 
     def tangent_of(self, number: int) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
         """What `tangent` gives, of another class at the state of the last tangent."""
-        each = self.classes[number]
-        return each.bordered(self._matrix), *self._by_strains(each)
+        return self._second_derivatives(self.classes[number], self.contact.tangent_of(number))
+
+    def _second_derivatives(self, each, touching):
+        """Those of a class, to which walls that touch add theirs."""
+        n, inner = each.unknowns, touching[: each.unknowns, : each.unknowns].tocoo()
+        matrix = each.bordered(self._matrix, inner.row, inner.col, inner.data)
+        mixed, curvature = self._by_strains(each)
+        return matrix, mixed + touching[:n, n:].toarray(), curvature + touching[n:, n:].toarray()
 
     def _by_strains(self, each):
         """(d2Pi/du d(e,k) (unknowns, 6), d2Pi/d(e,k)2 (6, 6)) in a class."""

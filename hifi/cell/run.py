@@ -40,47 +40,11 @@ def solve_cell(
     on_touch(pressure): told the pressure (MPa) of first touch, once, before the first state beyond it.
     ConvergenceError when the path ends short; what was recorded before has been seen by `on_state`.
     """
-    told = {"states": 0, "limit points": 0}
-    if _has_half_turns(case):
-        # a part of the cell will do until walls touch
-
-        def stop(pressure: float) -> None:
-            if case.contact == "auto":
-                raise _Touched
-            on_touch(pressure)
-
-        facts = _mesh(case, mesh_path, part=True)
-        try:
-            tell = _counted(on_state, told, "states"), _counted(on_limit_point, told, "limit points")
-            return follow_path(case, CellProblem(case.segment, mesh_path), *tell, stop), facts
-        except _Touched:
-            pass
-    facts, medium = _mesh(case, mesh_path), case.medium if case.contact == "third-medium" else None
+    facts, medium = mesh_of(case, mesh_path), case.medium if case.contact == "third-medium" else None
     problem = CellProblem(
         case.segment, mesh_path, medium=medium, contact=case.penalty if case.contact == "auto" else None
     )
-    tell = _after(on_state, told["states"]), _after(on_limit_point, told["limit points"])
-    return follow_path(case, problem, *tell, on_touch), facts
-
-
-class _Touched(Exception):
-    """Walls have met in a part of a cell, which knows no contact."""
-
-
-def _counted(call, counts, name):
-    """`call`, which counts up counts[name]."""
-
-    def counting(thing):
-        counts[name] += 1
-        call(thing)
-
-    return counting
-
-
-def _after(call, count):
-    """`call` without its first `count` times."""
-    left = iter(range(count))
-    return lambda thing: call(thing) if next(left, None) is None else None
+    return follow_path(case, problem, on_state, on_limit_point, on_touch), facts
 
 
 def _has_half_turns(case):
@@ -90,12 +54,13 @@ def _has_half_turns(case):
     return case.element == "hexahedra" and case.contact != "third-medium" and bool(alike)
 
 
-def _mesh(case, path, part=False):
-    """Facts of the mesh that the case asks for, of the whole cell or a part of it."""
+def mesh_of(case: CellCase, path: str | Path) -> dict:
+    """Write the mesh that the case asks for, of the whole cell or, where that will do, of a part of it; its
+    facts."""
     edge, gaps = case.mesh_size * EDGE if case.graded else None, case.contact == "third-medium"
     if case.element == "tetrahedra":
         return mesh_cell(case.segment, case.mesh_size, path, gaps=gaps, edge_size=edge)
-    return grid_cell(case.segment, case.mesh_size, path, edge, gaps, part)
+    return grid_cell(case.segment, case.mesh_size, path, edge, gaps, _has_half_turns(case))
 
 
 def follow_path(
@@ -151,6 +116,7 @@ def follow_path(
             control, first = LoadControl(), min(0.02 * mu, case.pressure)
         marks = tuple(np.linspace(start, target, case.levels + 1)[1:])
         path = EquilibriumPath(system, control, options, start)
+        path.newton.current = not medium  # the tangent that was measured at rest
 
         def keep(step):
             nonlocal passed

@@ -292,19 +292,20 @@ class _Factor:
     """The factorised matrix of a class of symmetry; what its pattern has cost is kept."""
 
     def __init__(self):
-        self._pattern = self._matrix = self._solver = None
+        self._pattern = self._values = self._matrix = self._solver = None
 
     def of(self, matrix):
         """DirectSolver that has factorised a symmetric CSR matrix, of the same `indices` while its pattern is
         the same."""
         if self._pattern is matrix.indices:
-            self._matrix.setValuesCSR(matrix.indptr, matrix.indices, matrix.data)
-            self._matrix.assemble()
+            self._values[:] = matrix.data
+            self._matrix.stateIncrease()
         else:
             self.release()
-            self._pattern = matrix.indices
-            self._matrix = PETSc.Mat().createAIJ(
-                matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
+            self._pattern, self._values = matrix.indices, matrix.data
+            # which looks at these arrays instead of copies of them
+            self._matrix = PETSc.Mat().createAIJWithArrays(
+                matrix.shape, (matrix.indptr, matrix.indices, matrix.data), comm=MPI.COMM_SELF
             )
             self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self._solver = DirectSolver(self._matrix, MPI.COMM_SELF)

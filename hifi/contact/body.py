@@ -29,7 +29,7 @@ class BodyContact(Contact):
         )
         dofs[np.isin(local, problem.fixed_dofs)] = -1
         wall = self._all(walls.wall_of_facet)
-        self._dofs = self._all(dofs.reshape(-1, 18))
+        self._dofs = self._all(dofs.reshape(len(self._facets), 3 * self._facets.shape[1]))
         self._areas = self._all(surface.reference_areas(problem, self._facets))
         # a gap is computed by one rank
         self._mine = [

@@ -20,6 +20,7 @@ from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.contact.walls import distances_from
 from pneunet.hifi.fem import surface
 from pneunet.hifi.fem.agreement import gathered
+from pneunet.hifi.fem.facets import kind_of, subdivided
 from pneunet.hifi.fem.mixed_field import MixedField
 
 #: slabs in the length that counts as far apart
@@ -45,7 +46,7 @@ class BodyDistance:
             float(np.hypot(s.width, s.chamber_top - s.chamber_bottom)) for s in manipulator.segments
         )
         self.apart = max(self.diameter, *(s.pitch for s in manipulator.segments if s.chambers))
-        self._local = surface.wall_triangles(problem, tags.OUTER, tags.TIP, tags.BASE)
+        self._local = surface.facet_nodes(problem, tags.OUTER, tags.TIP, tags.BASE)
         X = gathered(self.comm, problem.nodes[self._local])
         if self.comm.rank == 0:
             self._arrange(X)
@@ -55,7 +56,7 @@ class BodyDistance:
         _, self._first, self._facets = np.unique(
             np.round(X.reshape(-1, 3), 6), axis=0, return_index=True, return_inverse=True
         )
-        self._facets = self._facets.reshape(-1, 6)
+        self._facets = self._facets.reshape(X.shape[:2])
         x = X.reshape(-1, 3)[self._first, 0]
         number = np.floor(_SLABS * x / self.apart + _ROUNDING)
         self._slabs = [np.flatnonzero(number == n) for n in np.unique(number)]
@@ -86,7 +87,9 @@ class BodyDistance:
             return float(nodes)
         # no point of a facet is further than half its longest edge from one of its nodes
         facets = x[self._facets]
-        reach = np.linalg.norm(facets[:, [0, 1, 1, 2, 2, 0]] - facets[:, [3, 3, 4, 4, 5, 5]], axis=-1).max()
+        corners = kind_of(facets).corners
+        ring, middles = facets[:, :corners], facets[:, corners : 2 * corners]
+        reach = max(np.linalg.norm(end - middles, axis=-1).max() for end in (ring, np.roll(ring, -1, axis=1)))
         open_ = nodes > 2 * reach
         within = nodes + reach if open_ else max(self.diameter / 2, 3 * reach)
         near = [[] for _ in self._slabs]
@@ -127,7 +130,7 @@ class BodyDistance:
             behind = np.flatnonzero((distances < min(best, 0)) & (clear < self.diameter / 2))
             behind = behind[np.argsort(distances[behind], kind="stable")]
             solid = np.concatenate(
-                [surface.subdivided(x[self._facets[wall]], 4), x[self._facets[far & ~wall][:, :3]]]
+                [subdivided(x[self._facets[wall]], 4), subdivided(x[self._facets[far & ~wall]], 1)]
             )
             for chunk in np.split(behind, range(_AT_ONCE, len(behind), _AT_ONCE)):
                 inside = chunk[np.abs(winding_numbers(x[points[chunk]], solid)) > 0.5]

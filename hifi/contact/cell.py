@@ -4,11 +4,18 @@ by the strains (e, k).
 Each gap is seen from the section frame in its middle, in which a wall's node of local position y at the
 distance s along the axis lies at exp(s (k, e)) y: linear in y, and its derivatives by the strains are exact
 too (base.left_jacobian).
+
+The walls of the whole pitch are images of the mesh's (hifi.cell.symmetry): their nodes move as u = S x, with
+signs S of the class of symmetry in which the unknowns x are. Forces are S^T r then and stiffnesses S^T C S, r
+and C by the images. Rotations take each side of a gap to another one, so that only one of those that are
+images of each other is looked at and stands for all.
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from pneunet.base.left_jacobian import LeftJacobian
@@ -23,54 +30,93 @@ _ORDER = [3, 4, 5, 0, 1, 2]
 
 
 class CellContact(Contact):
-    """Contact in the gaps of `walls` under a penalty; unknowns are the problem's and the six strains
-    (e, k)."""
+    """Contact in the gaps of `walls` under a penalty, none without one; unknowns are those of the problem's
+    first class of symmetry and the six strains (e, k)."""
 
-    def __init__(self, problem: MixedField, walls: CellWalls, penalty: WallPenalty):
-        size = problem.unknowns + 6
+    def __init__(self, problem: MixedField, walls: CellWalls, penalty: WallPenalty | None):
+        self.problem, gaps = problem, walls.gaps if penalty else []
+        self._law = penalty and penalty.on(problem.segment.material.mu, problem.segment.gap)
+        along = [np.mean([wall.along.mean() for wall in gap]) for gap in gaps]
+        own = [wall for gap in gaps for wall in gap]
+        images = np.concatenate([wall.images.ravel() for wall in own] or [np.zeros(0, int)])
+        stations = np.concatenate(
+            [(wall.along - along[i // 2]).ravel() for i, wall in enumerate(own)] or [[]]
+        )
+        #: (m,) the walls' nodes in the images in which they are there, rotation and node in one number
+        self._images, first = np.unique(images, return_index=True)
+        number, self._nodes = np.divmod(self._images, len(problem.nodes))
+        self._turns = problem.turns[number]
+        #: where each stands along the axis, from the middle of its gap (mm)
+        self._stations, self._standing = np.unique(stations[first].round(9), return_inverse=True)
+        size = 3 * len(self._images) + 6
         super().__init__(MPI.COMM_SELF, size, slice(0, size))
-        self.problem, self.gaps = problem, len(walls.gaps)
-        self.law = penalty.on(problem.segment.material.mu, problem.segment.gap)
-        self._walls = []
-        for gap in walls.gaps:
-            rest = [problem.nodes[w.facets] + np.multiply.outer(w.shift, [[1, 0, 0]]) for w in gap]
-            middle = np.mean([r[..., 0].mean() for r in rest])
-            normal = mean_normal(rest[0]) - mean_normal(rest[1])
-            sheets = [
-                _Sheet(
-                    w.facets,
-                    problem.nodes[w.facets][..., 0] + w.shift[:, None] - middle,
-                    surface.reference_areas(problem, w.facets),
-                )
-                for w in gap
-            ]
-            normal /= np.linalg.norm(normal)
-            self._walls += [(sheets, normal), (sheets[::-1], -normal)]
+        self.gaps, self._stiffness = len(gaps), sp.csr_matrix((size, size))
+        self._signs = [self._signs_of(each, number) for each in problem.classes]
+        self._pairs = []
+        for pair in [pair for gap in gaps for pair in (gap, gap[::-1])]:
+            first, second = (mean_normal(problem.nodes[wall.facets] * wall.turn) for wall in pair)
+            facets = [np.searchsorted(self._images, wall.images) for wall in pair]
+            areas = surface.reference_areas(problem, pair[0].facets)
+            self._pairs.append((*facets, areas, (first - second) / np.linalg.norm(first - second)))
+        # rotations take the sides of gaps to each other: that many stand for all
+        self._pairs = self._pairs[: 2 * len(problem.segment.sides) // len(problem.turns)] if gaps else []
+
+    def _signs_of(self, each, number):
+        """S, sparse (images' displacements and twist (k, e), unknowns and (e, k)), of a class of symmetry."""
+        dofs = self.problem.displacement_dofs[self._nodes]
+        signs = each.chi[number, None] * self._turns * each.signs[dofs]
+        columns = np.append(each.reduced[dofs], each.unknowns + np.array(_ORDER))
+        rows = np.flatnonzero(columns >= 0)
+        values = np.append(signs, each.strains[_ORDER])[rows]
+        return sp.coo_matrix((values, (rows, columns[rows])), (self._size, each.unknowns + 6)).tocsr()
 
     def sides(self) -> list[Side]:
         problem, found = self.problem, []
-        y = problem.nodes * [0, 1, 1] + problem.displacement()
-        e, k = np.split(problem.strains.value, 2)
-        for number, (sheets, direction) in enumerate(self._walls):
-            places = [sheet.positions(y, np.concatenate([k, e])) for sheet in sheets]
-            t = touching(places[0], sheets[0].areas, places[1], direction, self.law)
+        y = problem.nodes[self._nodes] * [0, 1, 1] + problem.displacement()[self._nodes]
+        screw = _Screw(problem.strains.value, self._stations, self._standing, y * self._turns)
+        x = screw.positions
+        for number, (own, other, areas, direction) in enumerate(self._pairs):
+            t = touching(x[own], areas, x[other], direction, self._law, len(problem.turns) / 2)
             if t is not None:
-                found.append(_Side(problem, number, self.law, t, sheets, places))
+                nodes = np.concatenate([own[t.facet], other[t.other]], axis=1)
+                found.append(_Side(number, self._law, t, nodes, screw, x[other]))
         return found
+
+    def residual(self) -> np.ndarray:
+        return self._signs[0].T @ super().residual()
+
+    def tangent(self) -> sp.csr_matrix:
+        self._stiffness = super().tangent()
+        return self.tangent_of(0)
+
+    def tangent_of(self, number: int) -> sp.csr_matrix:
+        """Sparse (unknowns + 6, unknowns + 6) of a class of symmetry, at the state of the last tangent."""
+        signs = self._signs[number]
+        return (signs.T @ self._stiffness @ signs).tocsr()
+
+    def gradients(self, points: list) -> np.ndarray:
+        return super().gradients(points) @ self._signs[0]
+
+    def forces(self) -> np.ndarray:
+        # of the rotations those that keep a gap; they exchange its walls with the direction of the axis
+        kept = self.problem.turns[self.problem.turns[:, 2] > 0]
+        share = kept * kept[:, :1] / len(self.problem.turns)
+        return super().forces() * share.sum(axis=0)
 
     def measure(self, pressure: float) -> WallContact:
         """WallContact at the last residual of the gap with the largest force, `pressure` (MPa) being that of
         the air."""
         gaps = [WallContact() for _ in range(self.gaps)]
+        alike = len(self.problem.segment.sides) / self.gaps  # gaps that each stands for
         for side in self._now:
             t, gap = side.touching, side.number // 2
             pushing = t.pressure > IN_CONTACT * pressure
             if pushing.any():
-                d = distances_from(side.places[1], t.position[pushing])
+                d = distances_from(side.wall, t.position[pushing])
                 c = gaps[gap]
                 gaps[gap] = WallContact(
                     0.0,
-                    c.area + t.area[pushing].sum(),
+                    c.area + t.area[pushing].sum() / alike,
                     np.fmin(c.nearest, d.min()),
                     np.fmax(c.farthest, d.max()),
                 )
@@ -78,67 +124,64 @@ class CellContact(Contact):
         return replace(gaps[forces.argmax()], force=float(forces.max()))
 
 
-class _Sheet:
-    """facets (n, 6) of nodes, s (n, 6) their distances from the middle of the gap along the axis (mm), areas
-    (n,) in mm2."""
+class _Screw:
+    """Where the strains (e, k) take points of local positions y (m, 3), mm, that stand along the axis at
+    stations[standing]."""
 
-    def __init__(self, facets, s, areas):
-        self.facets, self.s, self.areas = facets, s, areas
-        self._stations, self._inverse = np.unique(s.round(9), return_inverse=True)
+    def __init__(self, strains, stations, standing, y):
+        e, k = np.split(strains, 2)
+        self._stations, self._standing = stations, standing
+        self._jacobian = LeftJacobian(stations[:, None] * np.concatenate([k, e]))
+        pose = self._jacobian.pose[standing]
+        self._rotation = pose[:, :3, :3]
+        self.positions = np.einsum("nij,nj->ni", self._rotation, y) + pose[:, :3, 3]
 
-    def positions(self, y, twist):
-        """(n, 6, 3) of local positions y (nodes, 3)."""
-        pose = LeftJacobian(self._stations[:, None] * twist).pose[self._inverse.reshape(self.s.shape)]
-        return np.einsum("...ij,...j->...i", pose[..., :3, :3], y[self.facets]) + pose[..., :3, 3]
+    @cached_property
+    def _rates(self):
+        """(m, 6, 6): twists by the strains' twist (k, e)."""
+        return (self._stations[:, None, None] * self._jacobian.matrix)[self._standing]
+
+    @cached_property
+    def _by_twist(self):
+        """(m, 3, 6): dx by the strains' twist."""
+        x = self.positions[..., None]
+        return np.cross(self._rates[:, :3], x, axisa=1, axisb=1, axisc=1) + self._rates[:, 3:]
+
+    @cached_property
+    def chain(self) -> sp.csr_matrix:
+        """Sparse (3 m, 3 m + 6): dx by the local positions and the strains' twist."""
+        m = len(self.positions)
+        turned = sp.bsr_matrix((self._rotation, np.arange(m), np.arange(m + 1)), shape=(3 * m, 3 * m))
+        return sp.hstack([turned, self._by_twist.reshape(3 * m, 6)]).tocsr()
+
+    def bend(self, f: np.ndarray) -> sp.csr_matrix:
+        """Sparse (3 m + 6, 3 m + 6): second derivatives of f . x for forces f (m, 3) that stand still."""
+        spin, D = self._rates[:, :3], self._by_twist
+        # the local frame turns under the force: d(R^T f) = R^T (f x spin)
+        turned = np.cross(f[..., None], spin, axisa=1, axisb=1, axisc=1)
+        coupling = sp.csr_matrix(np.einsum("nji,njs->nis", self._rotation, turned).reshape(-1, 6))
+        wrench = np.zeros((len(self._stations), 6))
+        np.add.at(wrench, self._standing, np.hstack([np.cross(self.positions, f), f]))
+        own = (self._stations[:, None, None] ** 2 * self._jacobian.slope(wrench)).sum(axis=0)
+        by_place = np.cross(D, f[..., None], axisa=1, axisb=1, axisc=1)  # d(x x f)
+        own += np.einsum("nis,nit->st", spin, by_place)
+        return sp.bmat([[None, coupling], [coupling.T, own]], format="csr")
 
 
 class _Side(Side):
-    """Its columns (n, 42) are the nodes' unknowns, and behind all unknowns the strains' twist (k, e)."""
+    """By the images' displacements and, behind all of them, the strains' twist (k, e). nodes (pairs, k): of
+    `screw`; wall (n, k, 3): the one that it pushes at, mm."""
 
-    def __init__(self, problem, number, law, t, sheets, places):
-        own, other = sheets
-        nodes = np.concatenate([own.facets[t.facet], other.facets[t.other]], axis=1)
-        self.s = np.concatenate([own.s[t.facet], other.s[t.other]], axis=1)
-        self.x = np.concatenate([places[0][t.facet], places[1][t.other]], axis=1)
-        columns = problem.reduced[problem.displacement_dofs[nodes]].reshape(len(nodes), 36)
-        strains = np.broadcast_to(problem.unknowns + np.array(_ORDER), (len(nodes), 6))
-        super().__init__(number, law, t, np.hstack([columns, strains]), problem.unknowns + 6)
-        self.places = places
-        e, k = np.split(problem.strains.value, 2)
-        self._jacobian = LeftJacobian(self.s.reshape(-1, 1) * np.concatenate([k, e]))
-        #: twists (n, 12, 6, 6) by the strains' twist (k, e)
-        self._rates = self.s[..., None, None] * self._jacobian.matrix.reshape(*self.s.shape, 6, 6)
-        self.rotation = self._jacobian.pose[:, :3, :3].reshape(*self.s.shape, 3, 3)
+    def __init__(self, number, law, t, nodes, screw, wall):
+        columns = 3 * nodes[..., None] + np.arange(3)
+        super().__init__(number, law, t, columns.reshape(len(nodes), -1), screw.positions.size)
+        self._screw, self.wall = screw, wall
 
-    def _motion(self):
-        """(n, 12, 3, 6): dx by the strains (k, e)."""
-        spin, shift = self._rates[..., :3, :], self._rates[..., 3:, :]
-        return np.cross(spin, self.x[..., None], axisa=-2, axisb=-2, axisc=-2) + shift
+    def rows(self, values: np.ndarray, places: np.ndarray, count: int) -> sp.csr_matrix:
+        return super().rows(values, places, count) @ self._screw.chain
 
-    def chained(self, by_position: np.ndarray) -> np.ndarray:
-        local = np.einsum("...ji,...j->...i", self.rotation, by_position).reshape(len(by_position), 36)
-        return np.hstack([local, np.einsum("cnis,cni->cs", self._motion(), by_position)])
-
-    def bend(self) -> np.ndarray:
-        t, D, pairs = self.touching, self._motion(), len(self.s)
-        f, H = t.forces, -t.push[:, None, None] * t.bend
-        HD = (H @ D.reshape(pairs, 36, 6)).reshape(pairs, 12, 3, 6)
-        H = H.reshape(pairs, 12, 3, 12, 3)
-        local = np.einsum("caji,cajbk,cbkl->caibl", self.rotation, H, self.rotation, optimize=True).reshape(
-            pairs, 36, 36
-        )
-        # the wall turns under a force that stands still: d(R^T f) = R^T (f x spin)
-        turned = np.cross(f[..., None], self._rates[..., :3, :], axisa=-2, axisb=-2, axisc=-2)
-        coupling = np.einsum("caji,cajs->cais", self.rotation, HD + turned).reshape(pairs, 36, 6)
-        own = np.einsum("cais,cait->cst", D, HD)
-        wrench = np.concatenate([np.cross(self.x, f), f], axis=-1)
-        own += np.einsum(
-            "ca,cast->cst",
-            self.s**2,
-            self._jacobian.slope(wrench.reshape(-1, 6)).reshape(*self.s.shape, 6, 6),
-        )
-        by_place = np.cross(D, f[..., None], axisa=-2, axisb=-2, axisc=-2)  # d(x x f)
-        own += np.einsum("cais,cait->cst", self._rates[..., :3, :], by_place)
-        return np.concatenate(
-            [np.concatenate([local, coupling], 2), np.concatenate([np.swapaxes(coupling, 1, 2), own], 2)], 1
-        )
+    def tangent(self) -> sp.csr_matrix:
+        nodes = self._columns.reshape(-1, 3) // 3
+        forces = np.zeros_like(self._screw.positions)
+        np.add.at(forces, nodes[:, 0], self.touching.forces.reshape(-1, 3))
+        return super().tangent() + self._screw.bend(forces)

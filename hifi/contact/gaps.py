@@ -15,10 +15,10 @@ from pneunet.hifi.path.low_rank import Stiffnesses
 
 
 class Side:
-    """One wall of a gap where it pushes at the other: the chain from positions to unknowns.
+    """One wall of a gap where it pushes at the other.
 
-    number: 2 g and 2 g + 1 are the sides of gap g. columns (pairs, m): places of what moves the nodes of the
-    Touching's pairs among `size` unknowns, -1 where held.
+    number: 2 g and 2 g + 1 are the sides of gap g. columns (pairs, 3 k): places of the displacements of the
+    Touching's k nodes among `size` unknowns, -1 where held.
     """
 
     def __init__(self, number: int, law: PenaltyLaw, touching: Touching, columns: np.ndarray, size: int):
@@ -39,45 +39,34 @@ class Side:
         t = self.touching
         return {(self.number, *name): k for name, k in zip(t.name.tolist(), t.area * t.slope)}
 
-    def chained(self, by_position: np.ndarray) -> np.ndarray:
-        """(pairs, m) derivatives by `columns` from those by the nodes' positions (pairs, 12, 3)."""
-        return by_position.reshape(-1, 36)
-
-    def bend(self) -> np.ndarray:
-        """(pairs, m, m) second derivatives of the energy at fixed pressures, but for what couples pairs."""
-        return -self.touching.push[:, None, None] * self.touching.bend
-
-    def _sparse(self, values, rows, count):
-        """Sparse (count, size) of values (pairs, m) in rows (pairs,)."""
-        rows = np.broadcast_to(rows[:, None], values.shape)[self._kept]
-        places = rows, self._columns[self._kept]
-        return sp.coo_matrix((values[self._kept], places), shape=(count, self._size)).tocsr()
+    def rows(self, values: np.ndarray, places: np.ndarray, count: int) -> sp.csr_matrix:
+        """Sparse (count, size) of derivatives by the nodes' positions, values (pairs, k, 3) in rows
+        (pairs,)."""
+        values = values.reshape(self._columns.shape)[self._kept]
+        at = np.broadcast_to(places[:, None], self._kept.shape)[self._kept], self._columns[self._kept]
+        return sp.coo_matrix((values, at), shape=(count, self._size)).tocsr()
 
     def forces(self) -> sp.csr_matrix:
         """Sparse (size, 1): first derivatives of the energy."""
-        pairs = len(self._columns)
-        return self._sparse(self.chained(self.touching.forces), np.zeros(pairs, int), 1).T.tocsr()
-
-    def _by_point(self, by_position):
-        """Sparse (points, size) of what pairs (pairs, 12, 3) add up to."""
-        return self._sparse(self.chained(by_position), self.touching.point, len(self.touching.area))
+        return self.rows(self.touching.forces, np.zeros(len(self._columns), int), 1).T.tocsr()
 
     @cached_property
     def gap_gradients(self) -> sp.csr_matrix:
         """Sparse (points, size): first derivatives of the gaps."""
-        return self._by_point(self.touching.gradient)
+        return self.rows(self.touching.gradient, self.touching.point, len(self.touching.area))
 
     def tangent(self) -> sp.csr_matrix:
-        """Sparse (size, size): second derivatives of the energy."""
-        t, both = self.touching, self._kept[:, :, None] & self._kept[:, None, :]
-        columns = self._columns
-        places = [np.broadcast_to(c, both.shape)[both] for c in (columns[:, :, None], columns[:, None, :])]
-        bend = sp.coo_matrix((self.bend()[both], places), shape=(self._size, self._size)).tocsr()
+        """Sparse (size, size): second derivatives of the energy, at fixed derivatives of the positions."""
+        t, pairs = self.touching, len(self._columns)
         # the pairs of a point share its gap and the sum of its weights
         shared = sp.diags(t.area * t.slope / 2) @ self.gap_gradients
-        shared += sp.diags(t.area * t.pressure) @ self._by_point(t.turn)
-        half = self.gap_gradients.T @ shared
-        return bend + half + half.T
+        shared += sp.diags(t.area * t.pressure) @ self.rows(t.turn, t.point, len(t.area))
+        left, right = [shared], [self.gap_gradients]
+        for a in range(2):
+            left.append(self.rows(-t.push[:, None, None] * t.bend[:, a], np.arange(pairs), pairs))
+            right.append(self.rows(t.shift[:, a], np.arange(pairs), pairs))
+        half = sp.vstack(left).T @ sp.vstack(right)
+        return (half + half.T).tocsr()
 
 
 class Contact:

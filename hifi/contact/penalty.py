@@ -1,9 +1,9 @@
 """Contact without friction between two walls that face each other: a penalty on what lies behind the other
 wall's surface.
 
-Both walls are sheets of quadratic facets, seen along a fixed direction d from the first wall towards the
-second. There each is a height over the plane normal to d, and the gap at a point x of one wall is the height
-of the other's surface X(xi) over it,
+Both walls are sheets of quadratic facets (hifi.fem.facets), seen along a fixed direction d from the first
+wall towards the second. There each is a height over the plane normal to d, and the gap at a point x of one
+wall is the height of the other's surface X(xi) over it,
     g = d . (X - x),   X - x parallel to d,   dg = m . (dX - dx),   m = n / (n . d),  n the surface's normal.
 There is no closest-point projection, which jumps. Near a facet's edge, where n jumps, the gaps g_i over the
 facets that meet there (each continued a little beyond its edge) are blended by weights w_i(xi) to
@@ -20,14 +20,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pneunet.hifi.fem import surface
+from pneunet.hifi.fem.facets import FacetKind, kind_of
 
-_GAUSS = surface.p2_shape(surface._BARYCENTRIC)
 #: facets of the other wall that may lie under a point
 _CANDIDATES = 10
 _ITERATIONS = 6
-#: half the width of the zone along an edge in which facets are blended, in barycentric coordinates
+#: facets are tried where the first guess is within this of their middle, of their width
+_NEAR = 1.2
+#: half the width of the zone along an edge in which facets are blended, of a facet's height over the edge
 _BLEND = 0.05
+#: a quadratic facet stays within this part of its nodes' range beyond them
+_BULGE = 0.35
 #: the gap over a facet that is seen edge-on would change without bound: steeper ones than this are no walls
 _STEEPEST = 0.2
 
@@ -79,8 +82,9 @@ class Touching:
     Per point (n,): overlap (mm), area (mm2, undeformed, with the share of this side), energy (N/mm), pressure
     (MPa), slope (MPa/mm); position, normal (n, 3): the point (mm) and the covector m; name (n, 2): facet of
     this wall and Gauss point on it. Per pair (c,): point, facet of this wall, other of the other wall; what
-    it adds to a point's derivatives by the six nodes of both: gradient (c, 12, 3) to dG, turn (c, 12, 3) to
-    dW / W in 1/mm, bend (c, 36, 36) to d2G in 1/mm, but for -(dG dW + dW dG) / W, which couples pairs.
+    it adds to a point's derivatives by the k nodes of both: gradient (c, k, 3) to dG; turn (c, k, 3) to dW /
+    W in 1/mm; bend and shift (c, 2, k, 3), whose products, bend_a shift_a + shift_a bend_a over a, add up to
+    d2G but for -(dG dW + dW dG) / W, which couples pairs.
     """
 
     overlap: np.ndarray
@@ -96,6 +100,7 @@ class Touching:
     gradient: np.ndarray
     turn: np.ndarray
     bend: np.ndarray
+    shift: np.ndarray
     name: np.ndarray
 
     @property
@@ -105,14 +110,14 @@ class Touching:
 
     @property
     def forces(self) -> np.ndarray:
-        """(c, 12, 3) N: how the energy changes with the nodes."""
+        """(c, k, 3) N: how the energy changes with the nodes."""
         return -self.push[:, None, None] * self.gradient
 
 
 def mean_normal(facets: np.ndarray) -> np.ndarray:
-    """(3,) area (mm2) of facets (n, 6, 3) as a vector; edges taken straight."""
-    a, b, c = (facets[:, i] for i in range(3))
-    return np.cross(b - a, c - a).sum(axis=0) / 2
+    """(3,) area (mm2) of facets (n, nodes, 3) as a vector; edges taken straight."""
+    ring = facets[:, : kind_of(facets).corners]
+    return np.cross(ring, np.roll(ring, -1, axis=1)).sum(axis=(0, 1)) / 2
 
 
 def touching(
@@ -123,28 +128,28 @@ def touching(
     law: PenaltyLaw,
     share: float = 0.5,
 ) -> Touching | None:
-    """The Touching of the Gauss points of facets `points` (n, 6, 3) in mm, undeformed areas (n,) in mm2, on
-    the `wall` (m, 6, 3) that lies in `direction` (3,); None where nothing comes closer than the law's onset.
-    share: of the contact that this side carries."""
+    """The Touching of the Gauss points of facets `points` (n, nodes, 3) in mm, undeformed areas (n, p) of
+    these points in mm2, on the `wall` (m, nodes, 3) that lies in `direction` (3,); None where nothing comes
+    closer than the law's onset. share: of the contact that this side carries."""
     if not len(points) or not len(wall) or not (np.isfinite(points).all() and np.isfinite(wall).all()):
         return None  # a state that has diverged has a residual that says so
-    heights = wall @ direction
-    x = np.einsum("qn,fni->fqi", _GAUSS, points)
+    kind, heights = kind_of(wall), wall @ direction
+    shape = kind.shape(kind.gauss)
+    x = np.einsum("qn,fni->fqi", shape, points)
     above = x @ direction
-    # a quadratic facet stays within this of its nodes
-    low = (heights.min(axis=1) - 0.2 * np.ptp(heights, axis=1)).min()
+    low = (heights.min(axis=1) - _BULGE * np.ptp(heights, axis=1)).min()
     facet, gauss = np.nonzero(above > low - law.onset)
     if not len(facet):
         return None
     plane = np.linalg.svd(direction[None])[2][1:]
     position = x[facet, gauss]
-    point, other, xi = _under(position @ plane.T, wall @ plane.T)
-    nodes, N, dN = wall[other], surface.p2_shape(_full(xi)), _slopes(xi)
+    point, other, xi = _under(kind, position @ plane.T, wall @ plane.T)
+    nodes, N, dN = wall[other], kind.shape(xi), kind.slopes(xi)
     tangents = np.einsum("can,cni->cai", dN, nodes)
     normal = np.cross(tangents[:, 0], tangents[:, 1])
     facing = -(normal @ direction) > _STEEPEST * np.linalg.norm(normal, axis=1)
     gap = (np.einsum("cn,cni->ci", N, nodes) - position[point]) @ direction
-    share_of, *shifts = _blend(xi)
+    share_of, *shifts = _blend(kind, xi)
     share_of = np.where(facing, share_of, 0.0)
     total = np.bincount(point, share_of, len(facet))
     mean = np.bincount(point, share_of * gap, len(facet)) / np.maximum(total, 1e-300)
@@ -153,21 +158,22 @@ def touching(
     if not len(keep):
         return None
     kept = np.flatnonzero(near)
-    point, other, N, dN, tangents, nodes, normal, gap, share_of, by_xi, by_xi_xi = (
-        a[keep] for a in (point, other, N, dN, tangents, nodes, normal, gap, share_of, *shifts)
+    point, other, xi, N, dN, tangents, nodes, normal, gap, share_of, by_xi, by_xi_xi = (
+        a[keep] for a in (point, other, xi, N, dN, tangents, nodes, normal, gap, share_of, *shifts)
     )
     m = normal / (normal @ direction)[:, None]
-    weights = np.concatenate([-_GAUSS[gauss[point]], N], axis=1)
+    weights = np.concatenate([-shape[gauss[point]], N], axis=1)
     part, by_xi, by_xi_xi = ((a.T / total[point]).T for a in (share_of, by_xi, by_xi_xi))
     beyond = gap - mean[point]
-    derivatives = _derivatives(weights, m, dN, tangents, nodes, plane, part, by_xi, by_xi_xi, beyond)
+    curved = np.einsum("cabn,cni->cabi", kind.curvatures(xi), nodes)
+    derivatives = _derivatives(weights, m, dN, tangents, curved, plane, part, by_xi, by_xi_xi, beyond)
     normals = np.zeros((len(facet), 3))
     np.add.at(normals, point, part[:, None] * m)
     own = facet[point]
     return Touching(
         *(
             -mean[kept],
-            share * areas[facet[kept]] * surface._WEIGHTS[gauss[kept]],
+            share * areas[facet[kept], gauss[kept]],
             *law(-mean[kept]),
             position[kept],
             normals[kept],
@@ -182,81 +188,62 @@ def touching(
     )
 
 
-#: barycentric coordinates by the last two; of two different ones the third
-_BY_XI, _THIRD = np.array([[-1, -1], [1, 0], [0, 1]]), np.array([[0, 2, 1], [2, 0, 0], [1, 0, 0]])
-
-
-def _blend(xi):
+def _blend(kind: FacetKind, xi):
     """(c,) weight of a facet in the gap at its coordinates xi (c, 2); its derivatives (c, 2) and (c, 2, 2) by
-    xi."""
-    t = np.clip((_full(xi) + _BLEND) / (2 * _BLEND), 0.0, 1.0)
-    rise, width = t * t * (3 - 2 * t), 2 * _BLEND
+    xi: a smooth step at each edge, multiplied."""
+    (values, ways), width = kind.edges, 2 * _BLEND
+    t = np.clip((values + xi @ ways.T + _BLEND) / width, 0.0, 1.0)
+    rise = t * t * (3 - 2 * t)
     slope, curve = 6 * t * (1 - t) / width, np.where((t > 0) & (t < 1), 6 - 12 * t, 0.0) / width**2
-    a, b, c = rise.T
-    others = np.stack([b * c, a * c, a * b], axis=-1)
-    second = slope[:, :, None] * slope[:, None, :] * rise[:, _THIRD]
-    second[:, range(3), range(3)] = curve * others
-    return a * b * c, (slope * others) @ _BY_XI, _BY_XI.T @ second @ _BY_XI
+    # products of the steps at all edges but one, and but two
+    same = np.eye(len(ways), dtype=bool)
+    others = np.where(same, 1.0, rise[:, None]).prod(axis=-1)
+    second = np.where(same[:, None] | same, 1.0, rise[:, None, None]).prod(axis=-1)
+    second = second * slope[:, :, None] * slope[:, None, :]
+    second[:, same] = curve * others
+    return rise.prod(axis=-1), (slope * others) @ ways, ways.T @ second @ ways
 
 
-def _derivatives(weights, m, dN, tangents, nodes, plane, part, by_xi, by_xi_xi, beyond):
-    """(gradient, turn, bend) of Touching. part, by_xi, by_xi_xi: w / W and the derivatives of w by xi, over
-    W; beyond (c,) mm: g - G.
+def _derivatives(weights, m, dN, tangents, curved, plane, part, by_xi, by_xi_xi, beyond):
+    """(gradient, turn, bend, shift) of Touching. curved (c, 2, 2, 3): X,ab; part, by_xi, by_xi_xi: w / W and
+    the derivatives of w by xi, over W; beyond (c,) mm: g - G.
 
     Both g and xi follow from X staying over the point: dg = m . (dX - dx), dxi_a = l_a . (dX - dx), and each
     second derivative is its covector's product with X,ab dxi_a dxi_b + 2 N,a dX dxi_a.
     """
-    n = len(m)
+    n, k = weights.shape
+    own = 3 * (k - dN.shape[2])
     along = -np.linalg.inv(np.einsum("pi,cai->cpa", plane, tangents)) @ plane
-    dxi = np.einsum("cai,cw->cawi", along, weights).reshape(n, 2, 36)
-    by_gap = np.einsum("ci,cw->cwi", m, weights).reshape(n, 36)
+    dxi = np.einsum("cai,cw->cawi", along, weights).reshape(n, 2, 3 * k)
+    by_gap = np.einsum("ci,cw->cwi", m, weights).reshape(n, 3 * k)
     turn = np.einsum("ca,cax->cx", by_xi, dxi)
     gradient = part[:, None] * by_gap + beyond[:, None] * turn
     covector = part[:, None] * m + beyond[:, None] * np.einsum("ca,cai->ci", by_xi, along)
     by_dxi = by_xi[:, :, None] * by_gap[:, None, :]
-    by_dxi[:, :, 18:] += np.einsum("can,ci->cani", dN, covector).reshape(n, 2, 18)
-    curved = np.einsum("abn,cni,ci->cab", _SECOND, nodes, covector) + beyond[:, None, None] * by_xi_xi
-    half = np.einsum("cax,cay->cxy", by_dxi + curved @ dxi / 2, dxi)
-    return gradient.reshape(n, 12, 3), turn.reshape(n, 12, 3), half + np.swapaxes(half, 1, 2)
+    by_dxi[:, :, own:] += np.einsum("can,ci->cani", dN, covector).reshape(n, 2, 3 * k - own)
+    curved = np.einsum("cabi,ci->cab", curved, covector) + beyond[:, None, None] * by_xi_xi
+    bend = by_dxi + curved @ dxi / 2
+    return tuple(a.reshape(*a.shape[:-1], k, 3) for a in (gradient, turn, bend, dxi))
 
 
-def _full(xi):
-    return np.concatenate([1 - xi.sum(axis=-1, keepdims=True), xi], axis=-1)
-
-
-def _slopes(xi):
-    """(..., 2, 6) derivatives of the quadratic shape functions by the last two barycentric coordinates xi
-    (..., 2)."""
-    a, (b, c) = 1 - xi.sum(axis=-1), np.moveaxis(xi, -1, 0)
-    zero = np.zeros_like(a)
-    by_b = [1 - 4 * a, 4 * b - 1, zero, 4 * (a - b), 4 * c, -4 * c]
-    by_c = [1 - 4 * a, zero, 4 * c - 1, -4 * b, 4 * b, 4 * (a - c)]
-    return np.stack([np.stack(by_b, axis=-1), np.stack(by_c, axis=-1)], axis=-2)
-
-
-#: (2, 2, 6) second derivatives of the quadratic shape functions
-_SECOND = np.array(
-    [[[4, 4, 0, -8, 0, 0], [4, 0, 0, -4, 4, -4]], [[4, 0, 0, -4, 4, -4], [4, 0, 4, 0, 0, -8]]], float
-)
-
-
-def _under(points, facets):
-    """Pairs (c,) of points (n, 2) and facets (m, 6, 2) they lie over, or just beside: point, facet,
+def _under(kind: FacetKind, points, facets):
+    """Pairs (c,) of points (n, 2) and facets (m, nodes, 2) they lie over, or just beside: point, facet,
     coordinates xi (c, 2)."""
     count = min(_CANDIDATES, len(facets))
-    near = cKDTree(facets[:, :3].mean(axis=1)).query(points, k=count)[1].reshape(len(points), count)
-    nodes = facets[near]
-    # from the coordinates of the straight-sided facet, by Newton
-    edges = nodes[..., 1:3, :] - nodes[..., :1, :]
+    centres, slopes = kind.shape(kind.centre) @ facets, kind.slopes(kind.centre) @ facets
+    near = cKDTree(centres).query(points, k=count)[1].reshape(len(points), count)
+    # by Newton, from the coordinates in the middle's tangent plane
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        xi = _solve2(np.swapaxes(edges, -1, -2), points[:, None] - nodes[..., 0, :])
-        point, column = np.nonzero((np.abs(xi - 0.5) < 1.5).all(axis=-1))
-        xi, nodes = xi[point, column], nodes[point, column]
+        xi = kind.centre + _solve2(np.swapaxes(slopes, -1, -2)[near], points[:, None] - centres[near])
+        point, column = np.nonzero((np.abs(xi - kind.centre) < _NEAR).all(axis=-1))
+        other, xi = near[point, column], xi[point, column]
+        nodes = facets[other]
         for _ in range(_ITERATIONS):
-            miss = points[point] - np.einsum("cn,cni->ci", surface.p2_shape(_full(xi)), nodes)
-            xi = xi + _solve2(np.einsum("can,cni->cia", _slopes(xi), nodes), miss)
-        over = (_full(xi).min(axis=-1) > -_BLEND) & (np.abs(miss).max(axis=-1) < 1e-3)
-    return point[over], near[point, column][over], xi[over]
+            miss = points[point] - np.einsum("cn,cni->ci", kind.shape(xi), nodes)
+            xi = xi + _solve2(np.einsum("can,cni->cia", kind.slopes(xi), nodes), miss)
+        values, ways = kind.edges
+        over = ((values + xi @ ways.T).min(axis=-1) > -_BLEND) & (np.abs(miss).max(axis=-1) < 1e-3)
+    return point[over], other[over], xi[over]
 
 
 def _solve2(A, b):

@@ -11,6 +11,7 @@ from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry import tags
 from pneunet.hifi.contact.walls import CellWalls, distances_from
 from pneunet.hifi.fem import surface
+from pneunet.hifi.fem.facets import kind_of
 
 PITCHES = 3
 DIVISIONS = 3
@@ -32,7 +33,7 @@ def draw_cell(problem: Any, state: Any, path: Path, pitches: int = PITCHES) -> b
         distances = node_distances(CellWalls(problem), state.array)
     finally:
         problem.strains.value[:] = kept
-    facets = surface.wall_triangles(problem, tags.OUTER)
+    facets = surface.facet_nodes(problem, tags.OUTER)
     of_facets = distances[facets]
     facing = np.isfinite(of_facets).all(axis=1)
     if not facing.any():
@@ -74,8 +75,8 @@ def node_distances(walls: CellWalls, array: np.ndarray) -> np.ndarray:
 
 
 def _positions(problem, state, facets, turn, shift):
-    """(rest, deformed) positions (facets, 6, 3) in mm of the image by a half turn of the facets of the pitch
-    that lies `shift` mm further along the body."""
+    """(rest, deformed) positions (facets, nodes, 3) in mm of the image by a half turn of the facets of the
+    pitch that lies `shift` mm further along the body."""
     X = problem.nodes[facets] * turn + [shift, 0, 0]
     screw = se3.exp_pose(state.strains.twist_vector * X[..., :1])
     local = X * [0, 1, 1] + problem.displacement(state.array)[facets] * turn
@@ -83,8 +84,8 @@ def _positions(problem, state, facets, turn, shift):
 
 
 def _fine(values):
-    """(points, m) of (facets, 6, m): at the corners of the flat triangles that a facet is drawn as."""
-    return np.einsum("tcn,fnm->ftcm", surface.subdivision(DIVISIONS), values).reshape(-1, values.shape[-1])
+    """(points, m) of (facets, nodes, m): at the corners of the flat triangles that a facet is drawn as."""
+    return np.einsum("tcn,fnm->ftcm", kind_of(values).flat(DIVISIONS), values).reshape(-1, values.shape[-1])
 
 
 def _mesh(facets):

@@ -16,6 +16,7 @@ from pneunet.geometry.parameters import Manipulator
 from pneunet.geometry.sections import rotation
 from pneunet.hifi.fem import surface
 from pneunet.hifi.fem.agreement import gathered
+from pneunet.hifi.fem.facets import kind_of, subdivided
 from pneunet.hifi.fem.mixed_field import MixedField
 
 _TOLERANCE = 1e-6
@@ -30,12 +31,33 @@ IN_CONTACT = 0.1
 
 @dataclass(frozen=True)
 class Wall:
-    """facets (n, 6) of nodes; turn (n, 3): diagonal of the rotation that takes each from its own place to the
-    cell's, shift (n,): by how much it is moved along X1 then, mm."""
+    """A wall of a cell's gap. facets (n, k) of nodes; number (n,): of the rotation that takes each from its
+    own place to the cell's, shift (n,): by how much it is moved along X1 then, mm."""
 
+    problem: MixedField
     facets: np.ndarray
+    number: np.ndarray
     shift: np.ndarray
-    turn: np.ndarray
+
+    @property
+    def images(self) -> np.ndarray:
+        """(n, k) rotation and node in one number."""
+        return self.number[:, None] * len(self.problem.nodes) + self.facets
+
+    @property
+    def turn(self) -> np.ndarray:
+        """(n, 1, 3) diagonals of the rotations."""
+        return self.problem.turns[self.number][:, None]
+
+    @property
+    def along(self) -> np.ndarray:
+        """(n, k) of the nodes along X1 at rest, mm."""
+        return self.problem.nodes[self.facets][..., 0] * self.turn[..., 0] + self.shift[:, None]
+
+    def local(self, array: np.ndarray | None = None) -> np.ndarray:
+        """(n, k, 3) of the nodes in the section frames at their X1, mm."""
+        u = self.problem.displacement(array)[self.facets]
+        return (self.problem.nodes[self.facets] * [0, 1, 1] + u) * self.turn
 
 
 @dataclass(frozen=True)
@@ -58,11 +80,13 @@ class WallDistances:
 
     def __init__(self, problem: MixedField, manipulator: Manipulator):
         self.problem, self.comm = problem, problem.mesh.comm
-        facets = surface.wall_triangles(problem, tags.OUTER)
+        facets = surface.facet_nodes(problem, tags.OUTER)
         self.facets, wall_of_facet, self.gaps = [], [], []
         wall = 0
         for i, (segment, start) in enumerate(zip(manipulator.segments, manipulator.starts)):
-            corners = problem.nodes[facets[:, :3]] @ rotation(segment)  # in its own axes
+            corners = problem.nodes[facets[:, : kind_of(facets).corners]] @ rotation(
+                segment
+            )  # in its own axes
             half = segment.chamber_thickness / segment.sin / 2
             centres = start + segment.chamber_positions
             for side in segment.sides:
@@ -75,7 +99,7 @@ class WallDistances:
                         wall_of_facet += [wall] * len(chosen)
                         wall += 1
                     self.gaps.append((i + 1, "top" if side > 0 else "bottom", gap, segment.gap))
-        self.facets = np.concatenate(self.facets) if self.facets else np.zeros((0, 6), int)
+        self.facets = np.concatenate([facets[:0], *self.facets])
         #: (facets,) of this rank: walls 2 g and 2 g + 1 face each other across gap g
         self.wall_of_facet = np.array(wall_of_facet, int)
         self._wall = gathered(self.comm, self.wall_of_facet)
@@ -92,7 +116,7 @@ class WallDistances:
         return out.reshape(-1, 2).min(axis=1)
 
     def at_nodes(self, array: np.ndarray | None = None) -> np.ndarray | None:
-        """(facets of all walls, 6) signed distances (mm) of their nodes from the wall that they face, on rank
+        """(facets of all walls, k) signed distances (mm) of their nodes from the wall that they face, on rank
         0 (None elsewhere)."""
         moved = self.problem.nodes + self.problem.displacement(array)
         positions = gathered(self.comm, moved[self.facets])
@@ -105,11 +129,11 @@ class WallDistances:
             a, b = walls[wall], walls[wall ^ 1]
             if len(a) and len(b):
                 points, inverse = np.unique(positions[a].reshape(-1, 3), axis=0, return_inverse=True)
-                out[a] = distances_from(positions[b], points)[inverse.ravel()].reshape(-1, 6)
+                out[a] = distances_from(positions[b], points)[inverse.ravel()].reshape(len(a), -1)
         return out
 
     def node_numbers(self, numbers: np.ndarray) -> np.ndarray | None:
-        """(facets of all walls, 6) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes`
+        """(facets of all walls, k) on rank 0 (None elsewhere) of `numbers` (all local nodes,), as `at_nodes`
         has them."""
         return gathered(self.comm, numbers[self.facets])
 
@@ -124,11 +148,11 @@ class CellWalls:
 
     def __init__(self, problem: MixedField):
         self.problem, s = problem, problem.segment
-        facets = surface.wall_triangles(problem, tags.OUTER)
+        facets = surface.facet_nodes(problem, tags.OUTER)
         self.gaps: list[tuple[Wall, Wall]] = []
         pieces = []
         for turn in problem.turns:
-            corners = problem.nodes[facets[:, :3]] * turn
+            corners = problem.nodes[facets[:, : kind_of(facets).corners]] * turn
             normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             pieces.append((corners, normal[:, 0] / np.linalg.norm(normal, axis=1)))
         for side in s.sides if len(problem.turns) < 4 else s.sides[:1]:
@@ -145,17 +169,14 @@ class CellWalls:
             for rows, x in ((first, plane), (second, plane + s.gap / s.sin)):
                 number, f = rows[:, :2].astype(int).T
                 shift = s.pitch * np.round((x - rows[:, 2]) / s.pitch)
-                walls.append(Wall(facets[f], shift, problem.turns[number]))
+                walls.append(Wall(problem, facets[f], number, shift))
             self.gaps.append((walls[0], walls[1]))
 
     def positions(self, wall: Wall, array: np.ndarray | None = None) -> np.ndarray:
-        """(n, 6, 3) deformed positions of a wall's nodes, in the section frame at X1 = 0."""
+        """(n, k, 3) deformed positions of a wall's nodes, in the section frame at X1 = 0."""
         e, k = np.split(self.problem.strains.value, 2)
-        u = self.problem.displacement(array)
-        X, turn = self.problem.nodes[wall.facets], wall.turn[:, None]
-        screw = se3.exp_pose(np.concatenate([k, e]) * (X * turn + wall.shift[:, None, None])[..., :1])
-        local = (X * [0, 1, 1] + u[wall.facets]) * turn
-        return np.einsum("...ij,...j->...i", screw[..., :3, :3], local) + screw[..., :3, 3]
+        screw = se3.exp_pose(np.concatenate([k, e]) * wall.along[..., None])
+        return np.einsum("...ij,...j->...i", screw[..., :3, :3], wall.local(array)) + screw[..., :3, 3]
 
     def distance(self) -> float:
         """Smallest signed distance in mm; inf without chambers."""
@@ -169,7 +190,7 @@ class CellWalls:
     def _contact(self, gap, pressure):
         (wall, other), facets = gap, gap[0].facets
         e, k = np.split(self.problem.strains.value, 2)
-        s = self.problem.nodes[facets][..., :1] + wall.shift[:, None, None]
+        s = wall.along[..., None]
         rotation = se3.exp_pose(np.concatenate([k, e]) * s)[..., :3, :3]
         forces = np.einsum("...ij,...j->...i", rotation, self.problem.medium_forces()[facets]).reshape(-1, 3)
         # a node of a cut lies on both sides of it, with a share of the force on each
@@ -177,10 +198,11 @@ class CellWalls:
             np.round(np.c_[facets.ravel(), s.ravel()], 6), axis=0, return_index=True, return_inverse=True
         )
         forces, x = forces[first], self.positions(wall).reshape(-1, 3)[first]
-        shares = np.outer(surface.reference_areas(self.problem, facets), [0, 0, 0, 1 / 3, 1 / 3, 1 / 3])
+        kind = kind_of(facets)
+        shares = surface.reference_areas(self.problem, facets) @ kind.shape(kind.gauss)
         areas = np.bincount(inverse.ravel(), shares.ravel())
         total = np.linalg.norm(forces.sum(axis=0))
-        touching = (areas > 0) & (
+        touching = (areas > _TOLERANCE) & (
             forces @ forces.sum(axis=0) > max(total, 1e-300) * IN_CONTACT * pressure * areas
         )
         distances = distances_from(self.positions(other), x)[touching]
@@ -195,14 +217,13 @@ class CellWalls:
 
 
 def wall_distance(points: np.ndarray, wall: np.ndarray) -> float:
-    """Smallest signed distance (mm) of the nodes of quadratic facets `points` (n, 6, 3) from the wall (m, 6,
-    3)."""
+    """Smallest signed distance (mm) of the nodes of facets `points` (n, k, 3) from the wall (m, k, 3)."""
     return float(distances_from(wall, np.unique(points.reshape(-1, 3), axis=0)).min())
 
 
 def distances_from(wall: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(n,) signed distances (mm) of points (n, 3) from a wall of quadratic facets (m, 6, 3)."""
-    triangles = surface.subdivided(wall, _DIVISIONS)
+    """(n,) signed distances (mm) of points (n, 3) from a wall of quadratic facets (m, k, 3)."""
+    triangles = subdivided(wall, _DIVISIONS)
     count = min(_NEIGHBOURS, len(triangles))
     near = cKDTree(triangles.mean(axis=1)).query(points, k=count)[1].reshape(len(points), count)
     candidates = triangles[near]

@@ -35,7 +35,6 @@ _FLAGS = [
     "-fassociative-math",
     "-fno-signed-zeros",
 ]
-VERSION = dolfinx.__version__
 MeshTags = dolfinx.mesh.MeshTagsMetaClass if OLD else dolfinx.mesh.MeshTags
 Form = fem.FormMetaClass if OLD else fem.Form
 
@@ -166,6 +165,21 @@ def read_mesh(path: Path | str, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTag
     read: list[meshfile.VolumeMesh] = []
     on_rank_0(comm, lambda: read.append(meshfile.read_mesh(path)[0]))
     return model_to_mesh(_Gmsh(*read) if read else None, comm)
+
+
+def curved_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray) -> Mesh:
+    """Mesh of hexahedra with triquadratic geometry: points (n, 3), cells (m, 27) in dolfinx's order, of rank
+    0."""
+    points, cells = (points, cells) if comm.rank == 0 else (points[:0], cells[:0])
+    with _compiler(comm):
+        if OLD:
+            node = ufl.VectorElement("Lagrange", "hexahedron", 2, variant="equispaced")
+            return dolfinx.mesh.create_mesh(comm, cells, points, ufl.Mesh(node))
+        import basix
+        import basix.ufl
+
+        node = basix.ufl.element("Lagrange", "hexahedron", 2, basix.LagrangeVariant.equispaced, shape=(3,))
+        return dolfinx.mesh.create_mesh(comm, cells, points, node)
 
 
 def model_to_mesh(model: object, comm: MPI.Comm) -> tuple[Mesh, MeshTags, MeshTags]:

@@ -1,15 +1,10 @@
-"""Facets of a body's surface: the samples every geometric measure is made of. Quadratic triangles of
-tetrahedra, biquadratic quadrilaterals of hexahedra, told apart by their number of nodes.
+"""Facets of a body's surface (hifi.fem.facets): the samples every geometric measure is made of."""
 
-Nodes of a facet: its corners in turn, then the middles of its edges in turn from the first corner, of a
-quadrilateral last its own.
-"""
-
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from pneunet.hifi.fem.facets import kind_of
 from pneunet.hifi.fem.mixed_field import MixedField
 
 #: edges of dolfinx's reference tetrahedron, in the order of its P2 edge nodes 4..9
@@ -59,6 +54,7 @@ def facet_nodes(problem: MixedField, *tags: int) -> np.ndarray:
     owned_cells = topology.index_map(3).size_local
     dofmap = problem.displacement_space.dofmap
     local_nodes = FACETS[problem.cell_name]
+    turned = kind_of(local_nodes).turned
     tags_of_cells = np.zeros(owned_cells + topology.index_map(3).num_ghosts, int)
     tags_of_cells[problem.cell_tags.indices] = problem.cell_tags.values
     rows = []
@@ -72,115 +68,16 @@ def facet_nodes(problem: MixedField, *tags: int) -> np.ndarray:
             row = nodes[local_nodes[local]]
             a, b, c = problem.nodes[row[:3]]
             if np.dot(np.cross(b - a, c - a), problem.nodes[nodes].mean(axis=0) - a) > 0:
-                row = row[KINDS[len(row)].turned]
+                row = row[turned]
             rows.append(row)
     return np.array(rows, dtype=int).reshape(-1, local_nodes.shape[1])
 
 
-def wall_triangles(problem: MixedField, *tags: int) -> np.ndarray:
-    """(m, 6) nodes of the tagged facets as quadratic triangles: what contact and distances see. Two of them
-    go through the nodes of a quadrilateral."""
-    facets = facet_nodes(problem, *tags)
-    if facets.shape[1] == 6:
-        return facets
-    return facets[:, [[0, 1, 2, 4, 5, 8], [0, 2, 3, 8, 6, 7]]].reshape(-1, 6)
-
-
 def reference_areas(problem: MixedField, facets: np.ndarray) -> np.ndarray:
-    """(facets,) undeformed areas in mm^2."""
-    X = problem.nodes[facets[:, : KINDS[facets.shape[1]].corners]]
-    return np.linalg.norm(np.cross(X, np.roll(X, -1, axis=1)).sum(axis=1), axis=1) / 2
-
-
-# degree-4 rule on the triangle (Dunavant 1985): exact for P2 shape functions times linear coordinates
-_A4, _B4 = 0.445948490915965, 0.091576213509771
-_BARYCENTRIC = np.array(
-    [[1 - 2 * a if i == j else a for i in range(3)] for a in (_A4, _B4) for j in range(3)]
-)
-_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
-
-
-def p2_shape(barycentric: np.ndarray) -> np.ndarray:
-    """(..., 6) quadratic shape functions at barycentric coordinates (..., 3); corners, then mid-edges 01, 12,
-    20."""
-    a, b, c = np.moveaxis(barycentric, -1, 0)
-    return np.stack(
-        [a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=-1
-    )
-
-
-def q2_shape(places: np.ndarray) -> np.ndarray:
-    """(..., 9) biquadratic shape functions at places (..., 2) of the unit square; corners in turn, middles of
-    edges, the middle."""
-    x = places[..., None]
-    one = np.concatenate([(1 - x) * (1 - 2 * x), 4 * x * (1 - x), x * (2 * x - 1)], axis=-1)
-    both = one[..., 0, :, None] * one[..., 1, None, :]
-    i, j = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1], [1, 1]]).T
-    return both[..., i, j]
-
-
-def _collapsed(points):
-    """(barycentric coordinates (points^2, 3), weights) of a rule on the triangle of degree 2 points - 2."""
-    x, w = np.polynomial.legendre.leggauss(points)
-    x, w = (1 + x) / 2, w / 2
-    a, b = np.meshgrid(x, x, indexing="ij")
-    places = np.stack([1 - a, a * (1 - b), a * b], axis=-1).reshape(-1, 3)
-    return places, 2 * np.outer(w * x, w).ravel()
-
-
-@dataclass(frozen=True)
-class FacetKind:
-    """corners: how many; turned: the nodes in the order of the other orientation. triangles (t, 3, 2) that
-    its reference shape is made of; barycentric (q, 3) and weights (q,) of a rule on each, exact for
-    displacement times place."""
-
-    corners: int
-    turned: list[int]
-    triangles: np.ndarray
-    barycentric: np.ndarray
-    weights: np.ndarray
-
-    def shape(self, places: np.ndarray) -> np.ndarray:
-        """(..., nodes) shape functions at reference places (..., 2)."""
-        if self.corners == 4:
-            return q2_shape(places)
-        return p2_shape(np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1))
-
-    def stretched(self, places: np.ndarray, corners: np.ndarray) -> np.ndarray:
-        """(..., q) area over reference area at places (q, 2) of facets with these corners (..., corners, 3),
-        mm2."""
-        if self.corners == 3:
-            one = np.ones(len(places))
-            slopes = [[-one, one, 0 * one], [-one, 0 * one, one]]
-        else:
-            x, y = places.T
-            slopes = [[y - 1, 1 - y, y, -y], [x - 1, -x, x, 1 - x]]
-        tangents = np.einsum("acq,...ci->a...qi", np.array(slopes), corners)
-        return np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1)
-
-
-_SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
-#: nodes of a facet -> its kind
-KINDS = {
-    6: FacetKind(3, [0, 2, 1, 5, 4, 3], np.array([[[0, 0], [1, 0], [0, 1]]], float), _BARYCENTRIC, _WEIGHTS),
-    9: FacetKind(4, [0, 3, 2, 1, 7, 6, 5, 4, 8], _SQUARE[[[0, 1, 2], [0, 2, 3]]], *_collapsed(5)),
-}
-
-
-def subdivision(divisions: int) -> np.ndarray:
-    """(divisions^2, 3, 6) quadratic shape functions at the corners of a facet's flat parts, of its own
-    orientation."""
-    n = divisions
-    up = [[(i, j), (i + 1, j), (i, j + 1)] for i in range(n) for j in range(n - i)]
-    down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i in range(n) for j in range(n - i - 1)]
-    corners = np.array(up + down) / n
-    return p2_shape(np.concatenate([1 - corners.sum(axis=-1, keepdims=True), corners], axis=-1))
-
-
-def subdivided(facets: np.ndarray, divisions: int) -> np.ndarray:
-    """(facets divisions^2, 3, 3) flat triangles between points of quadratic facets (facets, 6, 3), same
-    orientation."""
-    return np.einsum("tcn,fni->ftci", subdivision(divisions), facets).reshape(-1, 3, 3)
+    """(facets, p) undeformed areas in mm^2 that stand for the facets' Gauss points."""
+    kind = kind_of(facets)
+    corners = problem.nodes[facets[:, : kind.corners]]
+    return kind.reference_area * kind.gauss_weights * kind.stretched(kind.gauss, corners)
 
 
 def _clip(polygon, values, keep_below):
@@ -213,7 +110,7 @@ class SlabIntegral:
         high: float = np.inf,
         places: np.ndarray | None = None,
     ):
-        kind = KINDS[facets.shape[1]]
+        kind = kind_of(facets)
         X = problem.nodes if places is None else places
         X1 = X[facets[:, : kind.corners], 0]
         facets = facets[(X1.max(axis=1) > low) & (X1.min(axis=1) < high)]
@@ -258,7 +155,7 @@ class FaceQuadrature:
     def __init__(self, problem: MixedField, tag: int):
         self.comm = problem.mesh.comm
         self._facets = facet_nodes(problem, tag)
-        kind = KINDS[self._facets.shape[1]]
+        kind = kind_of(self._facets)
         places = (kind.barycentric @ kind.triangles).reshape(-1, 2)
         corners = problem.nodes[self._facets[:, : kind.corners]]
         self._weights = np.tile(kind.weights / 2, len(kind.triangles)) * kind.stretched(places, corners)

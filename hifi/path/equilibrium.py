@@ -93,7 +93,8 @@ class EquilibriumPath:
         if len(known) == 1:
             # (u = 0, P > 0) has load stiffness without membrane stress: start with the tangent at the start
             if self._tangent is None:
-                self.newton.factorise()
+                if not self.newton.current:
+                    self.newton.factorise()
                 self._tangent = self.control.tangent(system)
                 self.first_compliance = self._compliance()
             step = parameter - known[0].parameter

@@ -10,6 +10,7 @@ from typing import Any
 
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import write_text
+from pneunet.base.files.versions import versions
 from pneunet.base.system.log import show_on_screen
 
 #: name of a case's function, which its folder is named by, -> where that function is. Names stay as they were
@@ -43,7 +44,7 @@ def main(directory: str | Path) -> None:
     show_on_screen()  # into the case's log.txt
     directory = Path(directory)
     case = json.loads((directory / "case.json").read_text())
-    found = answer(case["function"], case["inputs"], directory)
+    found = answer(case["function"], case["inputs"], directory) | {"versions": versions()}
     write_text(directory / "answer.json", json.dumps(found, default=float))
 
 

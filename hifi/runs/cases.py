@@ -32,6 +32,7 @@ from pneunet.base.files.record import revision
 from pneunet.base.files.toml import as_table, from_table
 from pneunet.base.system.interrupts import Interrupted, deferred, is_interrupted
 from pneunet.base.system.processes import Limits, environment_without_launcher, machine_memory_MB, run_limited
+from pneunet.base.system.progress import eta
 from pneunet.hifi.fem.agreement import folder_of_all, on_rank_0
 from pneunet.hifi.runs.case_process import DONE, ERROR, MEMORY, REFUSED, STOPPED
 
@@ -260,10 +261,10 @@ class _Progress:
 
     def tell(self, case, record):
         self.done += 1
-        left = (time.monotonic() - self.started) / self.done * (self.total - self.done)
+        left = eta(time.monotonic() - self.started, self.done / self.total)
         memory = f", {record['peak_memory_MB']:.0f} MB" if record["peak_memory_MB"] else ""
         reason = f": {record['reason']}" if record["reason"] else ""
         log.info(
             f"{self.done:{len(str(self.total))}d}/{self.total}  {case.label or case.name}: {record['status']}"
-            f" in {record['seconds']:.1f} s{memory}{reason}; ETA {left:.0f} s"
+            f" in {record['seconds']:.1f} s{memory}{reason}; {left}"
         )

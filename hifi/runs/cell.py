@@ -14,6 +14,7 @@ from pneunet.base.files.schemas import CELL
 from pneunet.base.files.toml import to_table
 from pneunet.base.materials.laws import material_to_table
 from pneunet.base.system.interrupts import Interrupted
+from pneunet.base.system.progress import Pace
 from pneunet.base.units import KPA_PER_MPA, PER_MM_PER_M
 from pneunet.hifi.cell.file import read_cell
 from pneunet.hifi.cell.problem import CellProblem
@@ -41,7 +42,7 @@ def _solve(case, out):
     limit_points: list[LimitPoint] = []
     states: list[CellState] = []
     touched: list[float] = []
-    rows, started = [], time.perf_counter()
+    rows, started, pace = [], time.perf_counter(), Pace()
 
     def pass_limit_point(point: LimitPoint) -> None:
         limit_points.append(point)
@@ -51,7 +52,7 @@ def _solve(case, out):
         rows.append(_row(state))
         write_csv(out / "cell.csv", CELL, rows)
         states[:] = [state]
-        log.info(_line(state))
+        log.info(_line(state) + pace.left(len(rows) / (case.levels + 1)) * (len(rows) <= case.levels))
 
     def touch(pressure: float) -> None:
         touched.append(pressure * KPA_PER_MPA)

@@ -14,16 +14,22 @@ from mpi4py import MPI
 
 from pneunet.geometry.cad.body import session
 from pneunet.hifi.fem import compat
+from pneunet.hifi.verification import round_grids
 
 #: (mesh, cell tags, facet tags)
 TaggedMesh = tuple[Mesh, compat.MeshTags, compat.MeshTags]
 INNER, PLANE_X, PLANE_Y, PLANE_Z, OUTER, END, END_Y, END_Z = range(1, 9)
 
 
-def round_body(name: str, size: float, solid: int = 1) -> TaggedMesh:
-    """(mesh, cell tags, facet tags) of one of `ROUND`; edges are `size` times the distance from the centre or
-    axis; solid: tag of its cells."""
+def round_body(
+    name: str, size: float, solid: int = 1, element: CellType = CellType.tetrahedron
+) -> TaggedMesh:
+    """(mesh, cell tags, facet tags) of one of `ROUND`, of second-order geometry; edges are `size` times the
+    distance from the centre or axis; solid: tag of its cells."""
     comm = MPI.COMM_WORLD
+    if element == CellType.hexahedron:
+        grid, faces = GRIDS[name]
+        return _tagged(compat.curved_mesh(comm, *grid(size)), faces, solid)
     with session(name) if comm.rank == 0 else nullcontext() as model:
         if model:
             _mesh(model, *ROUND[name], size, solid)
@@ -100,6 +106,56 @@ ROUND = {
 }
 
 
+def _near(function, value):
+    return lambda x: np.isclose(function(x), value)
+
+
+#: the planes x, y, z = 0
+_PLANES = {tag: _near(lambda x, i=i: x[i], 0.0) for i, tag in enumerate((PLANE_X, PLANE_Y, PLANE_Z))}
+#: name -> (points and cells at a size, {tag of a face: whether places x (3, n) lie on it})
+GRIDS = {
+    "sphere": (
+        round_grids.sphere,
+        {
+            **_PLANES,
+            **{t: _near(lambda x: np.linalg.norm(x, axis=0), r) for t, r in ((INNER, 1), (OUTER, 2))},
+        },
+    ),
+    "tube": (
+        lambda size: round_grids.tube(size, SLICE),
+        {
+            **_PLANES,
+            END: _near(lambda x: x[0], SLICE),
+            **{t: _near(lambda x: np.hypot(x[1], x[2]), r) for t, r in ((INNER, 1), (OUTER, 2))},
+        },
+    ),
+    "cylinder": (
+        round_grids.cylinder,
+        {
+            PLANE_X: _PLANES[PLANE_X],
+            END: _near(lambda x: x[0], 1.0),
+            OUTER: _near(lambda x: np.hypot(x[1], x[2]), 1.0),
+        },
+    ),
+}
+
+
+def _tagged(mesh, faces, solid):
+    """The mesh with its cells' tag and those of its outer facets; faces: {tag: whether places x (3, n) lie
+    there}."""
+    where = [locate_entities_boundary(mesh, 2, on_it) for on_it in faces.values()]
+    tags = np.repeat(np.array(list(faces), np.int32), [len(facets) for facets in where])
+    facets = np.concatenate(where)
+    order = np.argsort(facets)
+    cells = mesh.topology.index_map(3)
+    cells = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
+    return (
+        mesh,
+        meshtags(mesh, 3, cells, np.full(len(cells), solid, np.int32)),
+        meshtags(mesh, 2, facets[order], tags[order]),
+    )
+
+
 def box(
     lengths: Sequence[float],
     counts: Sequence[int],
@@ -114,28 +170,20 @@ def box(
     cells.
     """
     mesh = create_box(MPI.COMM_WORLD, [[0.0, 0.0, 0.0], list(lengths)], list(counts), element)
-    where, tags = [], []
-    for axis, ends in enumerate(((PLANE_X, END), (PLANE_Y, END_Y), (PLANE_Z, END_Z))):
-        for tag, place in zip(ends, (0.0, lengths[axis])):
-            where.append(
-                locate_entities_boundary(
-                    mesh, 2, lambda x, axis=axis, place=place: np.isclose(x[axis], place)
-                )
-            )
-            tags.append(np.full(len(where[-1]), tag, np.int32))
-    facets, tags = np.concatenate(where), np.concatenate(tags)
-    order = np.argsort(facets)
-    cells = mesh.topology.index_map(3)
-    cells = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
+    axes = enumerate(((PLANE_X, END), (PLANE_Y, END_Y), (PLANE_Z, END_Z)))
+    faces = {
+        tag: _near(lambda x, axis=axis: x[axis], place)
+        for axis, ends in axes
+        for tag, place in zip(ends, (0.0, lengths[axis]))
+    }
+    tagged = _tagged(mesh, faces, solid)
     if move is not None:
         mesh.geometry.x[:] = move(mesh.geometry.x)
-    return (
-        mesh,
-        meshtags(mesh, 3, cells, np.full(len(cells), solid, np.int32)),
-        meshtags(mesh, 2, facets[order], tags[order]),
-    )
+    return tagged
 
 
-def strip(lengths: Sequence[float], counts: Sequence[int]) -> TaggedMesh:
+def strip(
+    lengths: Sequence[float], counts: Sequence[int], element: CellType = CellType.tetrahedron
+) -> TaggedMesh:
     """A box along x whose axis runs through the middle of its section."""
-    return box(lengths, counts, lambda X: X - [0.0, lengths[1] / 2, lengths[2] / 2])
+    return box(lengths, counts, lambda X: X - [0.0, lengths[1] / 2, lengths[2] / 2], element=element)

@@ -46,11 +46,15 @@ def held_at(problem: CellProblem, held: np.ndarray, strains: np.ndarray) -> Cell
 
 
 def torsion(
-    folder: Path, size: float = 0.3, stretch: float = 1.2, twist: float = 0.5
+    folder: Path,
+    size: float = 0.3,
+    stretch: float = 1.2,
+    twist: float = 0.5,
+    element: CellType = CellType.tetrahedron,
 ) -> list[ExactComparison]:
     """Torque and axial force of the cylinder as a cell; the gauge is its whole mantle."""
     problem = CellProblem(
-        Solid(1.0, 2.0), bodies.round_body("cylinder", size, tags.BODY), (bodies.OUTER,), centre=0.5
+        Solid(1.0, 2.0), bodies.round_body("cylinder", size, tags.BODY, element), (bodies.OUTER,), centre=0.5
     )
     state = held_at(problem, np.ones(6, bool), np.array([stretch, 0, 0, twist, 0, 0]))
     torque, axial = closed_forms.torsion(stretch, twist)

@@ -7,6 +7,7 @@ J. Solids Struct. 33, 1996).
 """
 
 import numpy as np
+from dolfinx.mesh import CellType
 
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.hifi.body.problem import Support
@@ -24,11 +25,12 @@ def panel(X: np.ndarray) -> np.ndarray:
     return np.stack([x, 44 * x / 48 + s * (44 - 28 * x / 48), z], axis=1)
 
 
-def rise(cells: int) -> tuple[float, int]:
-    """(rise of the upper corner in mm, dofs) of a layer of cells x cells x 1 bricks between two frictionless
+def rise(cells: int, element: CellType = CellType.tetrahedron) -> tuple[float, int]:
+    """(rise of the upper corner in mm, dofs) of a layer of cells x cells x 1 bricks, each a
+    hexahedron or six tetrahedra, between two frictionless
     planes."""
     thickness = 48 / cells
-    mesh = bodies.box((48.0, 1.0, thickness), (cells, cells, 1), panel)
+    mesh = bodies.box((48.0, 1.0, thickness), (cells, cells, 1), panel, element=element)
     supports = [Support(bodies.PLANE_X), Support(bodies.PLANE_Z, 2), Support(bodies.END_Z, 2)]
     load = EndLoad(bodies.END, force=(0.0, 100 * thickness, 0.0))
     system = body_system(mesh, supports, [load], NeoHookean(80.1938, bulk_modulus=400942.0))

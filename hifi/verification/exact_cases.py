@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import numpy as np
+from dolfinx.mesh import CellType
 from scipy.optimize import root_scalar
 
 from pneunet.base.materials.laws import NeoHookean
@@ -29,14 +30,16 @@ FLEXURE_CURVATURES = (0.1, 0.25, 0.5, 1.0, 1.5)
 
 
 def sphere(
-    folder: Path, size: float = 0.19
+    folder: Path, size: float = 0.19, element: CellType = CellType.tetrahedron
 ) -> tuple[list[ExactComparison], list[ExactComparison], list[int]]:
     """(radii at given pressures, pressures at given radii up to and past the limit, unstable directions at
     the latter).
 
     Pressure control to 0.8, from there on volume control; radii are those of the cavity's volume.
     """
-    system = body_system(bodies.round_body("sphere", size), SYMMETRY, [Pressure((bodies.INNER,))])
+    system = body_system(
+        bodies.round_body("sphere", size, element=element), SYMMETRY, [Pressure((bodies.INNER,))]
+    )
 
     def radius():
         return (6 * system.volume() / np.pi) ** (1 / 3)
@@ -68,11 +71,11 @@ class _Tube:
     """A quarter of a slice of a tube between two planes; the far one is held at a stretch that may be
     changed."""
 
-    def __init__(self, folder, size):
+    def __init__(self, size, element):
         self.stretch = 1.0
         end = Support(bodies.END, 0, lambda X, load: (self.stretch - 1) * X[:, 0])
         self.system = body_system(
-            bodies.round_body("tube", size), [*SYMMETRY, end], [Pressure((bodies.INNER,))]
+            bodies.round_body("tube", size, element=element), [*SYMMETRY, end], [Pressure((bodies.INNER,))]
         )
         self.told = f"h = {size:g} r", self.system.problem.dofs
 
@@ -85,9 +88,9 @@ class _Tube:
         return 4 * self.system.problem.reaction(bodies.END)[0][0]
 
 
-def tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
+def tube(folder: Path, size: float = 0.25, element: CellType = CellType.tetrahedron) -> list[ExactComparison]:
     """Inner radii of the tube held at its length."""
-    held = _Tube(folder, size)
+    held = _Tube(size, element)
     radii = follow(held.system, TUBE_PRESSURES, held.radius)
     held.system.destroy()
     return [
@@ -96,9 +99,11 @@ def tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
     ]
 
 
-def capped_tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
+def capped_tube(
+    folder: Path, size: float = 0.25, element: CellType = CellType.tetrahedron
+) -> list[ExactComparison]:
     """Inner radii and stretches of the tube whose axial force is the thrust P pi a^2 on its far caps."""
-    held = _Tube(folder, size)
+    held = _Tube(size, element)
     system, rows = held.system, []
     newton = Newton(system, LoadControl())
 
@@ -123,7 +128,11 @@ def capped_tube(folder: Path, size: float = 0.25) -> list[ExactComparison]:
 
 
 def torsion(
-    folder: Path, size: float = 0.3, stretch: float = 1.2, twist: float = 0.5
+    folder: Path,
+    size: float = 0.3,
+    stretch: float = 1.2,
+    twist: float = 0.5,
+    element: CellType = CellType.tetrahedron,
 ) -> tuple[list[ExactComparison], float]:
     """(torque and axial force of a stretched and twisted cylinder, largest error of its displacements in
     mm)."""
@@ -137,7 +146,7 @@ def torsion(
         return np.stack([lam * X[:, 0], y, z], axis=1) - X
 
     supports = [Support(bodies.PLANE_X, None, motion), Support(bodies.END, None, motion)]
-    system = body_system(bodies.round_body("cylinder", size), supports, [])
+    system = body_system(bodies.round_body("cylinder", size, element=element), supports, [])
     problem = system.problem
     [(force, moment)] = follow(system, [1.0], lambda: problem.reaction(bodies.END), first=0.5)
     X, u = from_all_ranks(problem, lambda X: X[:, 0] > -1)
@@ -153,7 +162,10 @@ def torsion(
 
 
 def flexure(
-    cells: tuple[int, int] = (4, 16), length: float = 0.3, thickness: float = 0.07
+    cells: tuple[int, int] = (4, 16),
+    length: float = 0.3,
+    thickness: float = 0.07,
+    element: CellType = CellType.tetrahedron,
 ) -> list[ExactComparison]:
     """Moments of a block of height 1 bent in plane strain: rollers in the middle, an end section that turns
     as it should.
@@ -175,7 +187,7 @@ def flexure(
 
     sides = [Support(bodies.PLANE_Z, 2), Support(bodies.END_Z, 2)]
     supports = [Support(bodies.PLANE_X, 0), *sides, Support(bodies.END, None, motion)]
-    system = body_system(bodies.box((length, 1.0, thickness), (*cells, 1)), supports, [])
+    system = body_system(bodies.box((length, 1.0, thickness), (*cells, 1), element=element), supports, [])
     told, rows = (f"{cells[0]} x {cells[1]} x 1", system.problem.dofs), []
     for k in FLEXURE_CURVATURES:
         solve_from(
@@ -205,12 +217,16 @@ STRIP_LOADS = {
 }
 
 
-def cantilever(name: str, cells: tuple[int, int, int] = (60, 2, 2)) -> tuple[np.ndarray, np.ndarray]:
+def cantilever(
+    name: str,
+    cells: tuple[int, int, int] = (60, 2, 2),
+    element: CellType = CellType.tetrahedron,
+) -> tuple[np.ndarray, np.ndarray]:
     """(tip (x, z) of a strip under one of STRIP_LOADS, that of the elastica with E = 3 mu and I = w
     h^3/12)."""
     length, width, height = STRIP
     load, elastica = STRIP_LOADS[name]
-    system = body_system(bodies.strip(STRIP, cells), [Support(bodies.PLANE_X)], [load], spacing=4.0)
+    system = body_system(bodies.strip(STRIP, cells, element), [Support(bodies.PLANE_X)], [load], spacing=4.0)
     follow(system, [1.0], lambda: None, first=0.2)
     X, u = from_all_ranks(system.problem, lambda X: X[:, 0] > length - 1e-6)
     system.destroy()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import ufl
+from dolfinx.mesh import CellType
 from ufl.core.expr import Expr
 
 from pneunet.hifi.body.problem import Support
@@ -39,9 +40,9 @@ class Fibres:
         return self.C / 2 * (ufl.exp(Q) - 1)
 
 
-def beam(cells: tuple[int, int, int]) -> tuple[float, int]:
+def beam(cells: tuple[int, int, int], element: CellType = CellType.tetrahedron) -> tuple[float, int]:
     """(deformed z of the point (10, 0.5, 1) in mm, dofs)."""
-    mesh = bodies.box((10.0, 1.0, 1.0), cells)
+    mesh = bodies.box((10.0, 1.0, 1.0), cells, element=element)
     system = body_system(
         mesh, [Support(bodies.PLANE_X)], [Pressure((bodies.PLANE_Z,), closed=False)], Fibres(), spacing=1.0
     )

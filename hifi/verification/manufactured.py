@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from dolfinx.mesh import CellType
 
 from pneunet.hifi.body.problem import Support
 from pneunet.hifi.fem import compat
@@ -58,11 +59,11 @@ def motion(X: np.ndarray, load: float = 1.0) -> np.ndarray:
     return np.stack(displacement(X.T, np.sin, np.cos), axis=1)
 
 
-def errors(cells: int) -> tuple[float, float, int]:
+def errors(cells: int, element: CellType = CellType.tetrahedron) -> tuple[float, float, int]:
     """(L2 error of u in mm^(5/2), of p in MPa mm^(3/2), dofs) on cells^3 bricks, starting from the
     interpolant."""
     faces = (bodies.PLANE_X, bodies.PLANE_Y, bodies.END_Y, bodies.PLANE_Z, bodies.END_Z)
-    mesh = bodies.box((1.0, 1.0, 1.0), (cells,) * 3)
+    mesh = bodies.box((1.0, 1.0, 1.0), (cells,) * 3, element=element)
     system = body_system(mesh, [Support(tag, None, motion) for tag in faces], [Exact()])
     problem = system.problem
     solve_from(system, 1.0, motion, lambda X: shifted_pressure(X.T, np.sin, np.cos))

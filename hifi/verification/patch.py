@@ -2,6 +2,7 @@
 rounding."""
 
 import numpy as np
+from dolfinx.mesh import CellType
 
 from pneunet.hifi.body.problem import Support
 from pneunet.hifi.fem.loads import Pressure
@@ -29,7 +30,7 @@ def gradient(load: float) -> np.ndarray:
     return np.array([[a, b, 0.0], [0.0, c, 0.0], [0.0, 0.0, 1 / (a * c)]])
 
 
-def affine(pressure: float = 0.2) -> tuple[float, float]:
+def affine(pressure: float = 0.2, element: CellType = CellType.tetrahedron) -> tuple[float, float]:
     """Largest errors (of u in mm, of p in MPa): four sides held affinely, rollers below, follower pressure on
     top.
 
@@ -48,7 +49,9 @@ def affine(pressure: float = 0.2) -> tuple[float, float]:
         Support(bodies.PLANE_Z, 2),
     ]
     system = body_system(
-        bodies.box((1.0, 1.0, 1.0), (3, 3, 3), distorted), supports, [Pressure((bodies.END_Z,), closed=False)]
+        bodies.box((1.0, 1.0, 1.0), (3, 3, 3), distorted, element=element),
+        supports,
+        [Pressure((bodies.END_Z,), closed=False)],
     )
     problem, P = system.problem, pressure
     system.apply_load = lambda load: setattr(problem.loads[0].value, "value", P * load)
@@ -63,12 +66,12 @@ def affine(pressure: float = 0.2) -> tuple[float, float]:
     return errors
 
 
-def squeezed(pressure: float = 0.5) -> tuple[float, float]:
+def squeezed(pressure: float = 0.5, element: CellType = CellType.tetrahedron) -> tuple[float, float]:
     """Largest (u in mm, error of p in MPa) of an incompressible cube on three rollers under pressure on its
     other faces."""
     supports = [Support(tag, i) for i, tag in enumerate((bodies.PLANE_X, bodies.PLANE_Y, bodies.PLANE_Z))]
     load = Pressure((bodies.END, bodies.END_Y, bodies.END_Z))
-    system = body_system(bodies.box((1.0, 1.0, 1.0), (3, 3, 3), distorted), supports, [load])
+    system = body_system(bodies.box((1.0, 1.0, 1.0), (3, 3, 3), distorted, element=element), supports, [load])
     problem = system.problem
     follow(system, [pressure], lambda: None, first=pressure)
     errors = largest(problem, problem.displacement()), largest(problem, problem.pressure_field() + pressure)

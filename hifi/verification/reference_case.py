@@ -1,14 +1,19 @@
-"""One FE case on a shipped mesh: `python -m pneunet.hifi.verification.reference_case OUT.json`, on any number
-of ranks.
+"""One FE case on a shipped mesh, `python -m pneunet.hifi.verification.reference_case OUT.json [OTHER.json]`,
+on any number of ranks; with another result it says how far they differ, and fails where that is too far.
 
 Its numbers must be the same on one and two ranks, on Debian 12 and 13, natively and in the container.
 """
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
+#: of `largest_difference`, whatever computed the two
+SAME = 1e-6
 DATA = Path(__file__).resolve().parent / "data"
 
 
@@ -59,18 +64,27 @@ def on_ranks(ranks: int, path: Path) -> dict[str, float]:
 
 def largest_difference(one: dict[str, float], two: dict[str, float]) -> float:
     """Largest difference of two results, relative to the larger of a value and 1 (0.01 for curvatures,
-    1/mm)."""
+    1/mm); infinite where one has a number that the other has not."""
+    if one.keys() != two.keys():
+        return math.inf
     scale = {name: 0.01 if "per_mm" in name else 1.0 for name in one}
-    return max(abs(two[name] - value) / max(abs(value), scale[name]) for name, value in one.items())
+    differences = [abs(two[name] - value) / max(abs(value), scale[name]) for name, value in one.items()]
+    return float(np.max(differences))  # nan if one is
 
 
-def main(path: str) -> None:
+def main(path: str, other: str = "") -> None:
     from mpi4py import MPI
 
     result = numbers()
-    if MPI.COMM_WORLD.rank == 0:
-        Path(path).write_text(json.dumps(result, indent=1) + "\n")
+    if MPI.COMM_WORLD.rank:
+        return
+    Path(path).write_text(json.dumps(result, indent=1) + "\n")
+    if other:
+        difference = largest_difference(result, json.loads(Path(other).read_text()))
+        print(f"largest relative difference from {other}: {difference:.1e} (may be {SAME:.0e})")
+        if not difference <= SAME:
+            sys.exit(1)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

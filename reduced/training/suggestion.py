@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from pneunet.base.errors import InputError
+from pneunet.base.system.progress import progress
 from pneunet.reduced.trained.gaussian import GaussianProcess
 from pneunet.reduced.trained.law import KindLaw
 
@@ -73,7 +74,7 @@ def greedy(process: GaussianProcess, inputs: np.ndarray, blocks: list[np.ndarray
         weight[block] /= len(block)  # every design counts alike
     chosen: list[int] = []
     left = dict(enumerate(blocks))
-    while len(chosen) < count:
+    for _ in progress(range(count), "designs"):
         gains = {
             number: (weight * (_whitened(process, unknown, block) ** 2).sum(axis=0)).sum()
             for number, block in left.items()

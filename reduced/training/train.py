@@ -19,6 +19,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.dataset import CellData, read_dataset
 from pneunet.base.files.folder import output_folder
+from pneunet.base.system.progress import Pace
 from pneunet.reduced.trained.file import read_law, write_law
 from pneunet.reduced.trained.law import KindLaw, TrainedLaw
 from pneunet.reduced.training.comparing import compare_laws, curve_table, law_table, learning_curve
@@ -122,8 +123,9 @@ def held_out_figures(laws: dict[str, KindLaw], samples: Samples) -> dict[str, Fi
 
 def _shown(results: Iterable, count: int, what: str) -> Iterator:
     """The results as they come, each told."""
+    pace = Pace()
     for number, result in enumerate(results, start=1):
-        log.info(f"{number}/{count} {what}")
+        log.info(f"{number}/{count} {what}{pace.left(number / count)}")
         yield result
 
 

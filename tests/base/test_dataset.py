@@ -16,7 +16,7 @@ def data():
     P = np.array([0.0, 0.1, 0.2, 0.3])
     about = {
         "kinds": ["one-sided", "twisting"],
-        "meshes": [{"name": "coarse", "mesh_size_mm": 2.0}],
+        "meshes": [{"name": "coarse", "mesh_size_mm": 2.0, "element": "hexahedra"}],
         "shape": [f"s{i}" for i in range(13)],
         "statuses": ["done", "crashed"],
         "directions": {},
@@ -79,7 +79,7 @@ def test_energy_defect_is_what_the_work_of_the_pressure_misses(data):
 
 def test_the_data_sheet_names_what_was_not_accepted(data):
     text = datasheet(data)
-    assert "| coarse (mesh_size_mm 2) | 3 | 1 (33.3%) |" in text
+    assert "| coarse (mesh_size_mm 2, element hexahedra) | 3 | 1 (33.3%) |" in text
     assert "crashed: ended by signal SIGSEGV" in text and "symmetry defect 10.0%" in text
 
 

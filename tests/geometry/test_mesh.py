@@ -53,13 +53,17 @@ def test_tagged_faces_lie_where_their_names_say(meshed):
     normals = np.cross(cavity[:, 1] - cavity[:, 0], cavity[:, 2] - cavity[:, 0]) / 2
     assert abs(np.einsum("nk,nk->", cavity.mean(axis=1), normals) / 3) == pytest.approx(facts["cavity_mm3"])
     assert normals.sum(axis=0) == pytest.approx(0.0, abs=1e-9)
-    # the channel's wall: on its four sides, from half a pitch before the first chamber to half a pitch after
-    # the last
+    # the channel's wall: on its four sides, on the axis from half a pitch before the first chamber to half a
+    # pitch after the last, and its ends lean
     x, y, z = np.moveaxis(channel, 2, 0)
     on_side = np.ptp(y, axis=1) < 1e-9
     assert abs(y[on_side]) == pytest.approx(2.0) and abs(z[~on_side]) == pytest.approx(1.0)
     assert np.ptp(z[~on_side], axis=1) == pytest.approx(0.0, abs=1e-9)
-    ends = first.chamber_positions[0] - first.pitch / 2, BOTH.length - last.end_wall
+    leans = [s.end_wall / s.end_length * abs(s.cot) * s.channel_width / 2 for s in BOTH.segments]
+    ends = (
+        first.chamber_positions[0] - first.pitch / 2 - leans[0],
+        BOTH.length - last.end_wall + leans[1],
+    )
     assert (x.min(), x.max()) == pytest.approx(ends)
     assert set(stored.cell_tags) == {tags.BODY, tags.BODY + 1}
 
@@ -84,6 +88,18 @@ def test_each_pressure_group_has_a_closed_cavity_between_bulkheads(tmp_path):
     assert total == pytest.approx(facts["cavity_mm3"])
     assert set(facts["areas"]) == {f"{name}_mm2" for name in tags.face_names(2).values()}
     assert min(facts["areas"].values()) > 0
+
+
+def test_a_rounded_body_meshes_in_tetrahedra_alone(tmp_path):
+    body, sharp = (Manipulator((replace(ONE_SIDED, chambers=1, fillet=r),)) for r in (0.4, 0.0))
+    facts, of_sharp = (mesh.mesh_manipulator(b, 2.0, tmp_path, "tetrahedra") for b in (body, sharp))
+    assert facts["segments"][0]["fillet_mm"] == 0.4 and "fillet_mm" not in of_sharp["segments"][0]
+    assert facts["mesh_volume_mm3"] == pytest.approx(facts["body_mm3"], rel=5e-3)
+    assert facts["cavity_mm3"] < 0.999 * of_sharp["cavity_mm3"]
+    with pytest.raises(InputError, match="fillet_mm = 0.4: a grid of hexahedra has sharp edges"):
+        mesh.mesh_manipulator(body, 2.0, tmp_path, "hexahedra")
+    with pytest.raises(InputError, match="fillet_mm = 0.4: a cell has sharp edges"):
+        cell.mesh_cell(body.segments[0], 2.0, tmp_path / "cell.npz")
 
 
 def test_the_same_mesh_again(meshed, tmp_path):

@@ -1,6 +1,8 @@
 """Moulds: layers against the CAD's volume, and by manifold3d, which shares nothing with the CAD kernel, that
 each mould is closed, can be pulled, and that together they leave the body."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,7 +37,19 @@ BODIES = {
     "both, two groups": (one_sided(90.0), twisting(120.0, group=2)),
     "above and below": (one_sided(), one_sided(70.0, roll=180)),
     "rolled": (one_sided(cavity_floor=0.4), one_sided(90.0, roll=270, group=2)),
+    # the channel's roof dips below one split plane and its floor rises above the other
+    "tapers": (twisting(110.0), replace(PASSIVE, channel_height=1.4, channel_width=2.0, width=9.0)),
 }
+
+
+def as_built(body):
+    """mm3 of the body that is meshed; its floors are not closer to the axis than a grid can have them."""
+    lifted = [
+        replace(s, chamber_height=s.cavity_top) if s.kind == "twisting" and not s.cavity_floor else s
+        for s in body.segments
+    ]
+    with cad.session():
+        return cad.build(Manipulator(tuple(lifted)))["body_mm3"]
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -46,6 +60,7 @@ def test_moulds_are_closed_can_be_pulled_and_leave_the_body(name):
     assert all(f["open_edges"] == 0 for f in facts) and sum("undercut_mm2" in f for f in facts) >= 2
     whole, left = body_part(body, EXACT, ports=False), cast(parts)
     assert left.volume() == pytest.approx(whole.volume, rel=1e-9)
+    assert whole.volume == pytest.approx(as_built(body), rel=1e-9)
     assert (left - whole.manifold()).volume() < 1e-9 * whole.volume
     assert (whole.manifold() - left).volume() < 1e-9 * whole.volume
 
@@ -111,6 +126,31 @@ def test_draft_and_fillets_thicken_walls_alone():
     length = np.ptp(body.channels[0])
     expected = 2 * (cores + corners + outside) + channel * length
     assert (left - whole).volume() == pytest.approx(expected, rel=0.05)
+
+
+def test_rounded_chambers_are_cast_as_the_cad_has_them_but_for_chords():
+    body = Manipulator((one_sided(fillet=0.4),))
+    parts = list(mould_parts(body, EXACT))
+    assert [part.check() for part in parts]
+    rounded, sharp = (body_part(b, EXACT, ports=False) for b in (body, Manipulator((one_sided(),))))
+    left = cast(parts)
+    off = (left - rounded.manifold()).volume() + (rounded.manifold() - left).volume()
+    assert off < 0.1 * abs(rounded.volume - sharp.volume) and off < 2e-3 * rounded.volume
+
+
+def test_draft_of_the_sides_widens_them_towards_the_split():
+    """By a wedge at either side of each layer."""
+    body, moulds = Manipulator((one_sided(90.0),)), Moulds(shrinkage=0.0, draft_outside=2.0)
+    parts = list(mould_parts(body, moulds))
+    assert [part.check() for part in parts]
+    whole, left = body_part(body, EXACT, ports=False).manifold(), cast(parts)
+    assert (whole - left).volume() < 1e-9
+    s, t = body.segments[0], np.tan(np.radians(2.0))
+    below = s.cavity_floor - s.core_bottom
+    wedges = s.length * t * below**2  # the lower layer's, both sides
+    high, rise = s.chamber_top - s.cavity_floor, s.chamber_top - s.core_top
+    wedges += 2 * s.chamber_thickness * t * rise**2 + s.length * t * (high**2 - rise**2)
+    assert (left - whole).volume() == pytest.approx(wedges, rel=1e-6)
 
 
 def test_moulds_make_up_for_shrinkage():

@@ -50,6 +50,12 @@ BARE = {"kind": "passive", "angle": 90.0, "chambers": 0, "plain_length": 20.0}
             "layer_thickness_mm = 0.5: only a one-sided segment",
         ),
         ({"angle": 90.0, "gap": 4.0}, r"end_margin_mm = 2 .* at least 2\.5 mm is needed with gap_mm = 4"),
+        (
+            {"fillet": 0.6, "gap": 1.1},
+            "fillet_mm = 0.6 cannot be built: at most 0.53 fits, limited by gap_mm",
+        ),
+        ({"fillet": -0.1}, "fillet_mm = -0.1 must be at least 0"),
+        ({**BARE, "fillet": 0.2}, "fillet_mm: a passive segment has no chambers"),
         ({"roll": 45}, "roll_deg = 45 is not known: write 0, 90, 180 or 270"),
         ({"group": 0}, r"pressure_group = 0 must lie in 1\.\.9"),
         ({"plain_length": 9.0}, "plain_length_mm = 9: only a passive segment"),

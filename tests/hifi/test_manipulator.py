@@ -184,5 +184,6 @@ def test_pressure_out_of_reach_keeps_what_converged(shared_directory):
 @pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts its own two ranks")
 def test_two_ranks_agree_with_one(tmp_path):
     one, two = reference_case.numbers(), reference_case.on_ranks(2, tmp_path / "two.json")
-    assert set(one) == set(two)
     assert reference_case.largest_difference(one, two) < 1e-8
+    for lost in ({"volume_mm3": float("nan")}, {"another": 0.0}):
+        assert not reference_case.largest_difference(one, two | lost) <= reference_case.SAME

@@ -12,6 +12,7 @@ from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.system import CellSystem
 from pneunet.hifi.contact.gaps import Side
 from pneunet.hifi.contact.penalty import PenaltyLaw, WallPenalty, touching
+from pneunet.hifi.fem.facets import kind_of
 from pneunet.hifi.path.low_rank import ContactUpdate
 from pneunet.hifi.verification.pressed import pressed
 
@@ -21,25 +22,30 @@ LAW = PenaltyLaw(2.0, 0.02, 1.0)
 
 
 class Sheet:
-    """A rectangle of `counts` x 2 quadratic triangles over x and y in +-size/2, z = height(x, y); down: seen
-    from below."""
+    """A rectangle of `counts` squares over x and y in +-size/2, z = height(x, y), each a facet of 9 nodes or
+    two of 6; down: seen from below."""
 
-    def __init__(self, counts, size, height, down=False):
+    def __init__(self, counts, size, height, down=False, nodes=6):
         n, m = counts
         i, j = np.meshgrid(np.arange(2 * n + 1), np.arange(2 * m + 1), indexing="ij")
         x, y = size[0] * (i / (2 * n) - 0.5), size[1] * (j / (2 * m) - 0.5)
         self.nodes = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
         a, b = np.meshgrid(2 * np.arange(n), 2 * np.arange(m), indexing="ij")
 
-        def at(di, dj):
-            return ((a + di) * (2 * m + 1) + b + dj).ravel()
+        def facets(*places):
+            return np.stack([((a + di) * (2 * m + 1) + b + dj).ravel() for di, dj in places], axis=1)
 
-        lower = [at(0, 0), at(2, 0), at(0, 2), at(1, 0), at(1, 1), at(0, 1)]
-        upper = [at(2, 2), at(0, 2), at(2, 0), at(1, 2), at(1, 1), at(2, 1)]
-        self.facets = np.concatenate([np.stack(lower, axis=1), np.stack(upper, axis=1)])
+        if nodes == 9:
+            ring = (0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)
+            self.facets = facets(*ring)
+        else:
+            lower, upper = ((0, 0), (2, 0), (0, 2)), ((2, 2), (0, 2), (2, 0))
+            lower, upper = lower + ((1, 0), (1, 1), (0, 1)), upper + ((1, 2), (1, 1), (2, 1))
+            self.facets = np.concatenate([facets(*lower), facets(*upper)])
+        kind = kind_of(self.facets)
         if down:
-            self.facets = self.facets[:, [0, 2, 1, 5, 4, 3]]
-        self.areas = np.full(len(self.facets), size[0] * size[1] / len(self.facets))
+            self.facets = self.facets[:, kind.turned]
+        self.areas = size[0] * size[1] / len(self.facets) * np.tile(kind.gauss_weights, (len(self.facets), 1))
 
 
 def sides(first, second, law=LAW):
@@ -51,7 +57,7 @@ def sides(first, second, law=LAW):
         if t is not None:
             nodes = [start[id(own)] + own.facets[t.facet], start[id(other)] + other.facets[t.other]]
             columns = 3 * np.concatenate(nodes, axis=1)[:, :, None] + np.arange(3)
-            found.append(Side(number, law, t, columns.reshape(-1, 36), size))
+            found.append(Side(number, law, t, columns.reshape(len(columns), -1), size))
     return found
 
 
@@ -71,12 +77,12 @@ def moved(sheet, displacement):
     return copy
 
 
-def bumps(seed=1):
+def bumps(nodes, seed=1):
     """Two curved, rough sheets of other meshes that overlap in the middle and are apart at their rims; the
     second lies aslant."""
     rng = np.random.default_rng(seed)
-    first = Sheet((3, 4), (2.0, 2.0), lambda x, y: 0.1 - 0.2 * (x**2 + y**2))
-    second = Sheet((4, 3), (2.2, 2.1), lambda x, y: 0.02 + 0.1 * x + 0.05 * x * y, down=True)
+    first = Sheet((3, 4), (2.0, 2.0), lambda x, y: 0.1 - 0.2 * (x**2 + y**2), nodes=nodes)
+    second = Sheet((4, 3), (2.2, 2.1), lambda x, y: 0.02 + 0.1 * x + 0.05 * x * y, down=True, nodes=nodes)
     return tuple(moved(s, rng.uniform(-0.01, 0.01, s.nodes.shape)) for s in (first, second))
 
 
@@ -90,8 +96,9 @@ def test_the_law_is_the_derivative_of_its_energy_and_linear_beyond_its_onset():
     assert pressure[-1] == pytest.approx(LAW.stiffness * 0.05)
 
 
-def test_forces_and_tangent_are_derivatives_of_the_energy_in_blended_edges_too():
-    first, second = bumps()
+@pytest.mark.parametrize("nodes", [6, 9])
+def test_forces_and_tangent_are_derivatives_of_the_energy_in_blended_edges_too(nodes):
+    first, second = bumps(nodes)
     direction = np.random.default_rng(2).normal(size=(len(first.nodes) + len(second.nodes), 3))
     h, n = 1e-6, len(first.nodes)
     ends = [(moved(first, s * h * direction[:n]), moved(second, s * h * direction[n:])) for s in (1, -1)]
@@ -106,22 +113,24 @@ def test_forces_and_tangent_are_derivatives_of_the_energy_in_blended_edges_too()
     assert product == pytest.approx(change, abs=1e-6 * np.abs(change).max())
 
 
-def test_both_walls_are_pushed_alike_and_flat_ones_not_sideways():
-    first, second = bumps()
+@pytest.mark.parametrize("nodes", [6, 9])
+def test_both_walls_are_pushed_alike_and_flat_ones_not_sideways(nodes):
+    first, second = bumps(nodes)
     forces = gradient(first, second)
     assert forces.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-12)
     assert forces[: len(first.nodes), 2].sum() > 1e-3  # the energy grows as the first wall goes up
     flat = (
-        Sheet((3, 2), (2.0, 2.0), lambda x, y: 0 * x),
-        Sheet((2, 4), (4.0, 4.0), lambda x, y: 0 * x - 0.05, down=True),
+        Sheet((3, 2), (2.0, 2.0), lambda x, y: 0 * x, nodes=nodes),
+        Sheet((2, 4), (4.0, 4.0), lambda x, y: 0 * x - 0.05, down=True, nodes=nodes),
     )
     assert gradient(*flat)[:, :2] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_flat_walls_of_other_meshes_carry_pressure_times_area_and_its_moment():
+@pytest.mark.parametrize("nodes", [6, 9])
+def test_flat_walls_of_other_meshes_carry_pressure_times_area_and_its_moment(nodes):
     delta, size = 0.05, (2.0, 1.0)
-    first = Sheet((3, 2), size, lambda x, y: 0 * x)
-    second = Sheet((4, 5), size, lambda x, y: 0 * x - delta, down=True)
+    first = Sheet((3, 2), size, lambda x, y: 0 * x, nodes=nodes)
+    second = Sheet((4, 5), size, lambda x, y: 0 * x - delta, down=True, nodes=nodes)
     force = LAW.stiffness * delta * size[0] * size[1]
     forces = gradient(first, second)
     for sheet, f, sign in ((first, forces[: len(first.nodes)], 1), (second, forces[len(first.nodes) :], -1)):

@@ -43,10 +43,6 @@ STIFFNESS_SLOPES_EVERY = 4
 REST = np.eye(6)[0]
 
 
-class _Touched(Exception):
-    """Walls have met in a cell that knows no contact."""
-
-
 class _Enough(Exception):
     """The scout has seen the pressures it was sent for."""
 
@@ -62,17 +58,12 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     segment = segment_from_table(
         inputs["segment"], "segment", material_from_table(inputs["material"], "material")
     )
-    # half turns spare most of a grid, but contact needs the whole, and so do strains without the symmetry
-    half_turns = inputs["mesh"].get("element") == "hexahedra" and not inputs["prescribed"]
-    for part in [True] * half_turns + [False]:
-        problem, mesh = _problem(segment, inputs["mesh"], directory / "cell.npz", part)
-        sampler = Sampler(problem, directory, inputs["slopes"])
-        try:
-            top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
-            sampler.free(top * np.arange(inputs["levels"] + 1) / inputs["levels"])
-            break
-        except _Touched:
-            sampler.destroy()
+    # half turns spare most of a grid, but strains without the symmetry need the whole
+    part = inputs["mesh"].get("element") == "hexahedra" and not inputs["prescribed"]
+    problem, mesh = _problem(segment, inputs["mesh"], directory / "cell.npz", part)
+    sampler = Sampler(problem, directory, inputs["slopes"])
+    top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
+    sampler.free(top * np.arange(inputs["levels"] + 1) / inputs["levels"])
     missing = sampler.prescribed(inputs["prescribed"])
     return {
         "mesh": mesh,
@@ -85,20 +76,20 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
 
 
 def _problem(segment, settings, path, part):
-    """(CellProblem, facts of its mesh); of a part of the cell without contact."""
+    """(CellProblem, facts of its mesh)."""
     size, edge = settings["mesh_size_mm"], settings.get("edge_size_mm")
     if settings.get("element") == "hexahedra":
         facts = grid_cell(segment, size, path, edge, part=part)
     else:
         facts = mesh_cell(segment, size, path, edge_size=edge)
-    problem = CellProblem(segment, path, contact=None if part else WallPenalty())
+    problem = CellProblem(segment, path, contact=WallPenalty())
     for written in (path, path.with_suffix(".msh")):
         written.unlink()
     return problem, facts | {"unknowns": problem.unknowns}
 
 
 class Sampler:
-    """The states of one cell. _Touched where walls meet in a problem without contact."""
+    """The states of one cell."""
 
     def __init__(self, problem, directory, slopes=False):
         self.problem, self.directory = problem, directory
@@ -124,7 +115,6 @@ class Sampler:
         self.walked = [self._walked(path)]
 
         def keep(step):
-            self._watch(system.walls.distance())
             self.walked.append(self._walked(path))
             if path.limit_points or system.load >= top:
                 raise _Enough
@@ -146,14 +136,6 @@ class Sampler:
         if limit is not None and share * limit < top:
             return share * limit, limit
         return top, limit
-
-    def _watch(self, distance):
-        """Walls that are closer than where contact begins to push have met."""
-        if self.problem.contact.gaps == 0 and distance < WallPenalty().onset * self.problem.segment.gap:
-            raise _Touched
-
-    def destroy(self) -> None:
-        self.system.destroy()
 
     @staticmethod
     def _walked(path):
@@ -189,7 +171,6 @@ class Sampler:
     def _record(self, array, residual, kind, system=None):
         system = system or self.system
         state = system.measure()
-        self._watch(state.wall_distance)
         slopes = {}
         if kind == "free":
             slopes = self._slopes(system, len(self.kept))

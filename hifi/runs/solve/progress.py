@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator
 
+from pneunet.base.system.progress import eta
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.parameters import Manipulator
 from pneunet.hifi.body.manipulator import DEAD_LOADS, ManipulatorSolve, Measured
@@ -49,7 +50,7 @@ class Progress:
         return (
             f"step {m.step:3d}  {place}  {m.iterations:2d} iterations  {m.factorisations} factorisations "
             f" stretch {m.largest_stretch:.2f}  wall distance {m.touch.wall_distance:.2f} mm "
-            f" {m.seconds:6.1f} s  ETA {m.seconds / done * (1 - done):5.0f} s{warning}"
+            f" {m.seconds:6.1f} s  {eta(m.seconds, done)}{warning}"
         )
 
 

@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from pneunet.base.files.record import write_record
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
-from pneunet.hifi.fem import compat
 from pneunet.hifi.fem.agreement import on_rank_0
 from pneunet.hifi.runs.solve.goal import Goal
 from pneunet.hifi.runs.solve.progress import break_stretch
@@ -65,20 +63,7 @@ class Record:
             largest_stretch=m.largest_stretch,
             timings=newton.timings,
             newton=vars(newton.options),
-            versions=versions(),
             failed_attempts=[[self.solve.path.told(at), why] for at, why in failures],
             stability_factorisations=sum(row["stability_factorisations"] for row in history),
             steps=history,
         )
-
-
-def versions() -> dict[str, str]:
-    """Versions of what computed the result."""
-    import petsc4py
-
-    return {
-        "dolfinx": compat.VERSION,
-        "petsc4py": petsc4py.__version__,
-        "mpi": MPI.Get_library_version().split(",")[0],
-        "numpy": np.__version__,
-    }

@@ -1,0 +1,229 @@
+"""Figures of cells on grids of hexahedra: how far their strains are from converged ones, what they cost."""
+
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.tables import table
+
+KINDS = ("one_sided_w10", "twist_w12")
+PRESSURES = (0.02, 0.05)
+#: mm: the usual grid; tetrahedra that it is compared with; grids with layers at planes with re-entrant edges,
+#: whose last two are extrapolated from. The middle one is the fine grid of CELL.toml's `graded`
+DEFAULT, TETRAHEDRA, LAYERED, FINE = 1.5, 2.0, (2.0, 1.0, 0.5), 1.0
+#: of convergence at edges of 270 degrees: twice the exponent of their singularity
+ORDER = 2 * 0.5445
+#: whose walls touch, and its grids without layers in a constant ratio, mm
+TOUCHING, CONTACT_SIZES = "twist_w15", (2.25, 1.5, 1.0)
+REPEATS = 3
+
+
+def case_of(name, size, element="hexahedra", graded=False, **more):
+    from pneunet.geometry.reference_cases import CASES
+    from pneunet.hifi.cell.file import CellCase
+
+    more = {"levels": 5, "contact": "none"} | more
+    return CellCase(CASES[name](60.0, 1), PRESSURES[-1], size, graded=graded, element=element, **more)
+
+
+def vector(strains, pitch):
+    """(6,) e and k times the pitch."""
+    return np.concatenate([strains[:3], strains[3:] * pitch])
+
+
+def sweep(case, path):
+    """Cost and strains (2, 6) at PRESSURES of 0 to 50 kPa in 5 levels, the stiffness at each."""
+    from pneunet.hifi.cell.run import solve_cell
+
+    states, started = [], time.process_time()
+    _, facts = solve_cell(case, path, states.append)
+    seconds = time.process_time() - started
+    at = {round(s.pressure, 6): s for s in states}
+    strains = [vector(at[p].strains.vector, case.segment.pitch) for p in PRESSURES]
+    stretches = [at[p].largest_stretch for p in PRESSURES]
+    return row(seconds, strains, facts, stiffness=True) | {"largest_stretch": stretches}
+
+
+def row(seconds, strains, facts, stiffness):
+    return {
+        "cpu_seconds": seconds,
+        "cells": facts["cells"],
+        "stiffness": stiffness,
+        "strains_e_k_pitch": np.array(strains).tolist(),
+    }
+
+
+def free_path(case, path):
+    """What `sweep` gives, of the free states alone, which ask for a fraction of the factorisations."""
+    from pneunet.hifi.cell.problem import CellProblem
+    from pneunet.hifi.cell.run import mesh_of
+    from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
+    from pneunet.hifi.path.control import LoadControl
+    from pneunet.hifi.path.equilibrium import EquilibriumPath
+    from pneunet.hifi.path.newton import NewtonOptions
+    from pneunet.hifi.path.stepping import StepSize, run_steps
+
+    started, seen = time.process_time(), {}
+    facts = mesh_of(case, path)
+    system = CellSystem(CellProblem(case.segment, path))
+    options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
+    run_steps(
+        EquilibriumPath(system, LoadControl(), options),
+        PRESSURES[-1],
+        StepSize(0.005, 1e-4, milestones=PRESSURES),
+        lambda step: seen.update({step.load: system.state[-6:].copy()}),
+    )
+    system.destroy()
+    strains = [vector(seen[p], case.segment.pitch) for p in PRESSURES]
+    return row(time.process_time() - started, strains, facts, stiffness=False)
+
+
+def orders_of(coarse, middle, fine, ratio):
+    """Observed orders (rows,) of convergence of rows of numbers, in their norm."""
+    steps = [np.linalg.norm(b - a, axis=-1) for a, b in ((coarse, middle), (middle, fine))]
+    return np.log(steps[0] / steps[1]) / np.log(ratio)
+
+
+def extrapolated(middle, fine, ratio):
+    """The limit at ORDER."""
+    return fine + (fine - middle) / (ratio**ORDER - 1)
+
+
+def errors_of(strains, limit):
+    """(2,) of (e, k pitch), over the norm of the limit's strain."""
+    return np.linalg.norm(strains - limit, axis=-1) / np.linalg.norm(limit - np.eye(6)[0], axis=-1)
+
+
+def in_turns(runs):
+    """{name: its cheapest row} of runs {name: function}, REPEATS times in turns."""
+    done = [{name: run() for name, run in runs.items()} for _ in range(REPEATS)]
+    return {name: min((each[name] for each in done), key=lambda row: row["cpu_seconds"]) for name in runs}
+
+
+def study(name, folder):
+    """Rows of one segment without contact, {mesh: row}, and what they converge to."""
+    path = folder / "cell.npz"
+    cases = {
+        "tetrahedra": case_of(name, TETRAHEDRA, "tetrahedra"),
+        "default": case_of(name, DEFAULT),
+    }
+    layered = {size: case_of(name, size, graded=True) for size in LAYERED}
+    for element in ("tetrahedra", "hexahedra"):
+        sweep(case_of(name, 4.0, element), path)  # compiles the forms
+    runs = {mesh: lambda case=case: sweep(case, path) for mesh, case in cases.items()}
+    runs |= {f"{mesh}, free": lambda case=case: free_path(case, path) for mesh, case in cases.items()}
+    found = in_turns(runs)
+    fine, finest = f"layers, {FINE:g} mm", f"layers, {LAYERED[-1]:g} mm"
+    for size, case in layered.items():
+        found[f"layers, {size:g} mm"] = (sweep if size == FINE else free_path)(case, path)
+    ratio = LAYERED[-2] / LAYERED[-1]
+    three = [np.array(found[f"layers, {size:g} mm"]["strains_e_k_pitch"]) for size in LAYERED]
+    limit = extrapolated(*three[1:], ratio)
+    for each in found.values():
+        each["error_rel"] = errors_of(np.array(each["strains_e_k_pitch"]), limit).tolist()
+    return {
+        "case": name,
+        "meshes": found,
+        "fine": fine,
+        "finest": finest,
+        "extrapolated": limit.tolist(),
+        "orders": orders_of(*three, ratio).tolist(),
+    }
+
+
+def contact_study(folder):
+    """The top state of a segment whose walls touch, with contact and without, on grids in a constant
+    ratio."""
+    from pneunet.hifi.cell.run import solve_cell
+
+    found = {}
+    for contact in ("auto", "none"):
+        rows = []
+        for size in CONTACT_SIZES:
+            case = case_of(TOUCHING, size, contact=contact, levels=1)
+            state, _ = solve_cell(case, folder / "touching.npz")
+            rows.append(vector(state.strains.vector, case.segment.pitch))
+        ratio, three = CONTACT_SIZES[0] / CONTACT_SIZES[1], np.array(rows)
+        limit = extrapolated(*three[1:], ratio)
+        found[contact] = {
+            "strains_e_k_pitch": three.tolist(),
+            "extrapolated": limit.tolist(),
+            "error_rel": errors_of(three, limit).tolist(),
+            "order": float(orders_of(*three, ratio)),
+        }
+    return found
+
+
+def cells():
+    """The part `cell-grids`: ({key: value}, details)."""
+    with tempfile.TemporaryDirectory() as name:
+        studies = [study(kind, Path(name)) for kind in KINDS]
+        touching = contact_study(Path(name))
+
+    def worst(mesh, what="error_rel"):
+        return float(max(np.max(each["meshes"][each.get(mesh, mesh)][what]) for each in studies))
+
+    def ratio(of):
+        seconds = [{mesh: row["cpu_seconds"] for mesh, row in each["meshes"].items()} for each in studies]
+        return max(each[f"default{of}"] / each[f"tetrahedra{of}"] for each in seconds)
+
+    def stretch_change(each):
+        default, fine = (np.array(each["meshes"][m]["largest_stretch"]) for m in ("default", each["fine"]))
+        return np.abs(fine / default - 1).max()
+
+    return {
+        "cell_grid_error_rel": worst("default"),
+        "cell_fine_grid_error_rel": worst("fine"),
+        "cell_finest_grid_error_rel": worst("finest"),
+        "cell_tetrahedra_error_rel": worst("tetrahedra"),
+        "stretch_mesh_rel": float(max(stretch_change(each) for each in studies)),
+        "cell_grid_order": float(np.min([each["orders"] for each in studies])),
+        "cell_contact_grid_error_rel": touching["auto"]["error_rel"][CONTACT_SIZES.index(DEFAULT)],
+        "cell_default_vs_tets_ratio": ratio(""),
+        "cell_default_vs_tets_free_ratio": ratio(", free"),
+        "cell_fine_cpu_seconds": worst("fine", "cpu_seconds"),
+        "cell_default_cpu_seconds": worst("default", "cpu_seconds"),
+    }, {"studies": studies, "contact": touching}
+
+
+ABOUT = f"""\
+Both kinds at 60 degrees on sheared grids of hexahedra, half a cell or a quarter, 0 to 50 kPa. *layers*: one
+element of a fifth of the largest on each side of planes with re-entrant edges. The limit is extrapolated from
+the last two grids with layers at order {ORDER:.2f}, which edges of 270 degrees allow; the observed order, of
+all three, stands below. Errors are norms of (e, k pitch) over the norm of the extrapolated strain. Processor
+seconds are of five levels with the stiffness at each, or of the free states alone.""".splitlines()
+CONTACT = f"""\
+{TOUCHING}, whose walls touch, at 50 kPa on grids without layers: errors against the last two, extrapolated at
+the same order.""".splitlines()
+
+
+def section(details):
+    """Lines on both studies for docs/verification.md."""
+    lines = ["## The unit cell on grids", "", *ABOUT, ""]
+    names = {"tetrahedra": f"tetrahedra, {TETRAHEDRA:g} mm", "default": f"hexahedra, {DEFAULT:g} mm"}
+    rows = []
+    for each in details["studies"]:
+        for mesh, r in each["meshes"].items():
+            strains = [f"{r['strains_e_k_pitch'][1][i]:.4f}" for i in (0, 1, 3, 4)]
+            errors = [f"{error:.2%}" for error in r["error_rel"]]
+            told = f"{r['cpu_seconds']:.1f}{', with stiffness' * r['stiffness']}"
+            name = mesh.removesuffix(", free")
+            rows.append([each["case"], names.get(name, name), r["cells"], *strains, *errors, told])
+        limit = each["extrapolated"][1]
+        strains = [f"{limit[i]:.4f}" for i in (0, 1, 3, 4)]
+        orders = [f"order {order:.2f}" for order in each["orders"]]
+        rows.append([each["case"], "extrapolated", "", *strains, *orders, ""])
+    head = ["case", "mesh", "cells", "e1", "e2", "k1 pitch", "k2 pitch", "error at 20 kPa", "at 50 kPa"]
+    lines += table([*head, "processor s"], rows)
+    lines += ["", "Strains at 50 kPa.", "", *CONTACT, ""]
+    rows = []
+    for contact, found in details["contact"].items():
+        told = {"auto": "held apart", "none": "pass through each other"}[contact]
+        for size, strains, error in zip(CONTACT_SIZES, found["strains_e_k_pitch"], found["error_rel"]):
+            rows.append([told, f"{size:g}", f"{strains[0]:.4f}", f"{strains[3]:.4f}", f"{error:.2%}"])
+        limit = found["extrapolated"]
+        last = f"order {found['order']:.2f}"
+        rows.append([told, "extrapolated", f"{limit[0]:.4f}", f"{limit[3]:.4f}", last])
+    return lines + table(["walls", "grid, mm", "e1", "k1 pitch", "error"], rows)
