@@ -29,7 +29,7 @@ def remeshed():
 
     campaign = read_campaign(CAMPAIGN)
     coarse = campaign.meshes[0]
-    mesh = replace(coarse, settings={"mesh_size_mm": MESH_SIZE})
+    mesh = replace(coarse, mesh_size=MESH_SIZE)
     held_out = [d for d in campaign.designs if d.held_out and d.mesh is coarse and d.index < BELOW]
     other = {"mesh": mesh.settings, "prescribed": []}
     designs = tuple(
