@@ -17,7 +17,7 @@ from pneunet.base.errors import InputError
 from pneunet.cli import COMMANDS
 
 #: programs that long blocks may name beside this project's; they are not asked about their options
-OTHERS = set(". apt-get cat cd cp export git paraview pip pre-commit sbatch".split())
+OTHERS = set(". apt-get cat cd cp export git jupyter paraview pip pre-commit sbatch".split())
 #: what a block may be of: shown as it is written, and nothing that could pass for a command
 SHOWN = {"csv", "ini", "json", "text", "toml"}
 LAUNCHERS = {"mpirun", "srun", "apptainer", "podman"}
@@ -54,9 +54,9 @@ def command_fault(words: list[str], alone: bool = True) -> str:
     """What is wrong with a command, or "". alone: it is not run, so that its program must be known here."""
     while words and re.fullmatch(r"\w+=.*", words[0]):
         words = words[1:]  # settings in front
-    if not words or words[0] in OTHERS:
+    program = Path(words[0]).name if words else ""
+    if not words or program in OTHERS:
         return ""
-    program = Path(words[0]).name
     if program == "pneunet":
         return _pneunet_fault(words[1:])
     if program == "make":
