@@ -54,7 +54,7 @@ def command_fault(words: list[str], alone: bool = True) -> str:
     """What is wrong with a command, or "". alone: it is not run, so that its program must be known here."""
     while words and re.fullmatch(r"\w+=.*", words[0]):
         words = words[1:]  # settings in front
-    program = Path(words[0]).name if words else ""
+    program = (Path(words[0]).name or words[0]) if words else ""
     if not words or program in OTHERS:
         return ""
     if program == "pneunet":
