@@ -56,9 +56,9 @@ def command_fault(words: list[str], alone: bool = True) -> str:
     """What is wrong with a command, or "". alone: it is not run, so that its program must be known here."""
     while words and re.fullmatch(r"\w+=.*", words[0]):
         words = words[1:]  # settings in front
-    if not words or {words[0], Path(words[0]).name} & OTHERS:
+    program = (Path(words[0]).name or words[0]) if words else ""
+    if not words or program in OTHERS:
         return ""
-    program = Path(words[0]).name
     if program == "pneunet":
         return _pneunet_fault(words[1:])
     if program == "make":
