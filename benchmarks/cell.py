@@ -21,7 +21,7 @@ def case(mesh_size, levels=10, graded=False):
     from pneunet.hifi.cell.file import CellCase
 
     segment = CASES["one_sided_w10"](angle=60.0, chambers=1, material=NeoHookean(0.2068))
-    return CellCase(segment, 0.05, mesh_size, levels, contact="none", graded=graded)
+    return CellCase(segment, 0.05, mesh_size, levels, contact="none", graded=graded, element="tetrahedra")
 
 
 def sweep(what, folder):

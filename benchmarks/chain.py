@@ -105,7 +105,7 @@ def long_segment():
 
     body = Manipulator((CASES["one_sided_long"](angle=60.0, chambers=26),))
     with tempfile.TemporaryDirectory() as folder:
-        mesh_manipulator(body, 2.0, folder)
+        mesh_manipulator(body, 2.0, folder, "tetrahedra")
         solve = ManipulatorSolve(body, Path(folder) / "manipulator.npz")
         start, result = time.perf_counter(), solve.run(0.05)
         seconds = time.perf_counter() - start

@@ -40,7 +40,7 @@ def sweep(body, contact, size=SIZE):
     from pneunet.hifi.cell.run import solve_cell
 
     strains, states, reason = np.full((len(PRESSURES), 6), np.nan), [], None
-    case = CellCase(body, PRESSURES[-1], size, len(PRESSURES), contact=contact)
+    case = CellCase(body, PRESSURES[-1], size, len(PRESSURES), contact=contact, element="tetrahedra")
     with tempfile.TemporaryDirectory() as folder:
         try:
             solve_cell(case, Path(folder) / "cell.npz", states.append)

@@ -75,7 +75,7 @@ class Design:
         pressure_kPa: float | Iterable[float],
         name: str = "design",
         law: str | SegmentLaw = "trained",
-        mesh_size_mm: float = 2.0,
+        mesh_size_mm: float = 1.5,
     ) -> "Design":
         """A Manipulator made by hand at a pressure, or at one for each group of its segments. law: 'trained',
         'analytic', a law's file (.npz) or a SegmentLaw. InputError where pressure or mesh size is none."""

@@ -43,7 +43,8 @@ def solved_cell(segment):
     states = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.npz"
-        solve_cell(CellCase(segment, TOP_kPa * MPA_PER_KPA, MESH_SIZE, LEVELS), path, states.append)
+        case = CellCase(segment, TOP_kPa * MPA_PER_KPA, MESH_SIZE, LEVELS, element="tetrahedra")
+        solve_cell(case, path, states.append)
         return cell_surface(CellProblem(segment, path), states[-1]), states
 
 

@@ -22,7 +22,7 @@ from pneunet.base.quantities import Checked, quantities, quantity, rounded, show
 from pneunet.base.units import KPA_PER_MPA, LARGEST_PRESSURE_KPA
 from pneunet.geometry.fillets import NO_GRID, refuse_fillets
 from pneunet.geometry.loading import CONTACTS, CONTROL_KEYS, Control, DeadLoads, Extras, read_control
-from pneunet.geometry.meshfile import ELEMENTS
+from pneunet.geometry.meshfile import ELEMENTS, USUAL_ELEMENT
 from pneunet.geometry.parameters import NO_CHAMBERS, OF_CHAMBERS, PASSIVE, PLAIN, Manipulator, Segment
 
 SCHEMA = "pneunet-design-1"
@@ -35,8 +35,8 @@ class DesignFile(Checked):
     """What the commands mesh, shape and solve read.
 
     pressure in MPa: one for all, or a tuple of one for each group of segments; base_pose (4, 4): the base
-    frame in the target's coordinates (mm); mesh_size in mm; element: tetrahedra of gmsh's or hexahedra of a
-    grid; target: text that names the target file; result: free table of numbers that `pneunet design` adds
+    frame in the target's coordinates (mm); mesh_size in mm; element: hexahedra of a grid or tetrahedra of
+    gmsh's; target: text that names the target file; result: free table of numbers that `pneunet design` adds
     and nobody reads back. loads, control, measure and contact ('auto': walls of neighbouring chambers that
     touch are held apart; 'none': they are not) are for the finite elements alone; a pressure of 0 everywhere
     goes with loads only.
@@ -46,8 +46,8 @@ class DesignFile(Checked):
     pressure: float | tuple[float, ...] = quantity("kPa")
     name: str = quantity(None, "design")
     base_pose: np.ndarray = field(default_factory=lambda: np.eye(4))
-    mesh_size: float = quantity("mm", 2.0, low=0.1, high=20)
-    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
+    mesh_size: float = quantity("mm", 1.5, low=0.1, high=20)
+    element: str = quantity(None, USUAL_ELEMENT, choices=tuple(ELEMENTS))
     target: str = quantity(None, "")
     result: dict = field(default_factory=dict)
     loads: DeadLoads = DeadLoads()
@@ -174,7 +174,7 @@ def design_tables(design: DesignFile) -> dict:
         if segment.material == first:
             del row["material"]
     tables = {"schema": SCHEMA} | to_table(design) | design.control.table()
-    for key, usual in (("target", ""), ("contact", CONTACTS[0]), ("element", "tetrahedra")):
+    for key, usual in (("target", ""), ("contact", CONTACTS[0])):
         if tables[key] == usual:
             del tables[key]
     tables["material"] = material_to_table(first)

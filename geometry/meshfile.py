@@ -18,7 +18,9 @@ MESH = "manipulator.npz"
 SCHEMA, AGAIN = "pneunet mesh 2", "make it again with pneunet mesh"
 #: corners of a cell and of its facets
 TETRAHEDRA, HEXAHEDRA = (4, 3), (8, 4)
-ELEMENTS = {"tetrahedra": TETRAHEDRA, "hexahedra": HEXAHEDRA}
+ELEMENTS = {"hexahedra": HEXAHEDRA, "tetrahedra": TETRAHEDRA}
+#: what bodies and cells are meshed with where nobody says
+USUAL_ELEMENT = "hexahedra"
 
 
 def _members(about, names):

@@ -93,7 +93,7 @@ PAGES = {
         "docs/use-workspace.md",
     ),
     "mesh": Page(
-        "The body in CAD and as tetrahedra, with volumes and checks: mesh/manipulator.step, .msh,"
+        "The body in CAD and as a mesh, with volumes and checks: mesh/manipulator.step, .msh,"
         " .npz and mesh.json. pneunet solve does this by itself; alone it shows whether a body can be"
         " built.",
         (

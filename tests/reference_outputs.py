@@ -77,7 +77,7 @@ def cell():
     from pneunet.hifi.cell.problem import CellProblem
     from pneunet.hifi.cell.run import follow_path
 
-    case = CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1)
+    case = CellCase(CASES["one_sided_w10"](60.0, 1), 0.02, 3.0, levels=1, element="tetrahedra")
     state = follow_path(case, CellProblem(case.segment, CELL_MESH, contact=case.penalty))
     strains = state.strains.vector.tolist()
     return {"strains": strains, "volume_mm3": state.volume, "stiffness": state.stiffness.tolist()}

@@ -20,7 +20,7 @@ from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
 #: how far prediction and finite elements may be apart before the verdict looks for a cause: % of length (RMS
 #: of points paired by arc length), % of the largest |k| of a segment
 POSITION_BAR, STRAIN_BAR = 2.0, 5.0
-#: mm; the law was learned on such meshes
+#: mm; a coarser one may be the cause
 USUAL_MESH = DesignFile.mesh_size
 
 

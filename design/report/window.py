@@ -98,7 +98,7 @@ def window(steps: LoadSteps, off_screen: bool = False) -> Any:
     plotter: Any = pyvista.Plotter(title=steps.name, off_screen=off_screen)
     plotter.set_background("white")
     keys, last = shown_fields(steps), len(steps.labels) - 1
-    now = {"step": last, "key": 0, "opacity": 1.0}
+    now: dict[str, Any] = {"step": last, "key": 0, "opacity": 1.0}
 
     def draw():
         key = keys[now["key"]]

@@ -17,10 +17,12 @@ from pneunet.base.errors import InputError
 from pneunet.cli import COMMANDS
 
 #: programs that long blocks may name beside this project's; they are not asked about their options
-OTHERS = set(". apt-get cat cd cp export git paraview pip pre-commit sbatch".split())
+OTHERS = set(". apt-get cat cd cp export git jupyter paraview pip pre-commit sbatch".split())
 #: what a block may be of: shown as it is written, and nothing that could pass for a command
 SHOWN = {"csv", "ini", "json", "text", "toml"}
-LAUNCHERS = {"mpirun", "srun", "apptainer", "podman"}
+LAUNCHERS = {"mpirun", "srun"}
+#: which start a program by `run` or `exec` and do else what is their own
+CONTAINERS = {"apptainer", "docker", "podman"}
 
 
 def faults(text: str) -> list[str]:
@@ -54,9 +56,9 @@ def command_fault(words: list[str], alone: bool = True) -> str:
     """What is wrong with a command, or "". alone: it is not run, so that its program must be known here."""
     while words and re.fullmatch(r"\w+=.*", words[0]):
         words = words[1:]  # settings in front
-    if not words or words[0] in OTHERS:
+    program = (Path(words[0]).name or words[0]) if words else ""
+    if not words or program in OTHERS:
         return ""
-    program = Path(words[0]).name
     if program == "pneunet":
         return _pneunet_fault(words[1:])
     if program == "make":
@@ -66,7 +68,9 @@ def command_fault(words: list[str], alone: bool = True) -> str:
     if program.startswith("python"):
         script = next((word for word in words[1:] if not word.startswith("-")), None)
         return "" if script and (ROOT / script).is_file() else f"there is no {script}"
-    if program in LAUNCHERS:
+    if program in CONTAINERS and words[1] not in ("run", "exec"):
+        return ""
+    if program in LAUNCHERS | CONTAINERS:
         n = next((n for n, word in enumerate(words) if n and Path(word).name in ("pneunet", "python")), 0)
         return command_fault(words[n:]) if n else f"nothing of pneunet's is started by {program}"
     return f"nobody here knows {program}" if alone else ""

@@ -18,7 +18,7 @@ from pneunet.geometry.cad.meshing import cut_off, refuse_absurd, save, tetrahedr
 from pneunet.geometry.designfile import read_design_file, segment_table
 from pneunet.geometry.fillets import NO_GRID, refuse_fillets
 from pneunet.geometry.grids.body import body_grid
-from pneunet.geometry.meshfile import MESH, VolumeMesh, open_edges
+from pneunet.geometry.meshfile import MESH, USUAL_ELEMENT, VolumeMesh, open_edges
 from pneunet.geometry.parameters import Manipulator
 
 log = logging.getLogger(__name__)
@@ -37,12 +37,12 @@ def mesh_design(path: str | Path, directory: str | Path, mesh_size: float | None
 
 
 def mesh_manipulator(
-    manipulator: Manipulator, mesh_size: float, directory: str | Path, element: str = "tetrahedra"
+    manipulator: Manipulator, mesh_size: float, directory: str | Path, element: str = USUAL_ELEMENT
 ) -> dict:
     """Write manipulator.npz, which finite elements read, with manipulator.msh, manipulator.step and mesh.json
     for people to `directory`; return the content of mesh.json.
 
-    mesh_size in mm: edges of gmsh's tetrahedra, or largest ones of the grid's hexahedra (geometry.grids);
+    mesh_size in mm: largest edges of the grid's hexahedra (geometry.grids), or edges of gmsh's tetrahedra;
     element: one of geometry.meshfile.ELEMENTS. Raises InputError when gmsh cannot mesh the body or a check
     fails; nothing is left half-written.
     """

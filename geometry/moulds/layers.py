@@ -210,10 +210,11 @@ def _run(manipulator, row, indices, split):
         up = s.roll == turn
         mine = float(ports[s.group - 1])
         own = s.chambers and start <= mine < start + s.length
-        bars = [bar and bar.turned(to_run) for bar in (row[i].core, row[i].channel, row[i].layer)]
+        core, channel = row[i].core.turned(to_run), row[i].channel.turned(to_run)
+        layer = row[i].layer and row[i].layer.turned(to_run)
         first, last = (slant * s.cot * (1 if up else -1) for slant in row[i].slants)
         guides = ((mine, -1 if up else 1),) if own else ()
-        parts.append(RunMember(s, start, up, *bars, (first, last), guides))
+        parts.append(RunMember(s, start, up, core, channel, layer, (first, last), guides))
     planes = sorted({p.segment.cavity_floor * side for p in parts for side in p.sides}) or [0.0]
     if planes[-1] - planes[0] < SAME:
         planes = planes[:1]

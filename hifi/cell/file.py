@@ -11,7 +11,7 @@ from pneunet.base.materials.laws import material_from_table, material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.units import LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.geometry.designfile import segment_from_table, segment_table
-from pneunet.geometry.meshfile import ELEMENTS
+from pneunet.geometry.meshfile import ELEMENTS, USUAL_ELEMENT
 from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.contact.medium import ThirdMedium
 from pneunet.hifi.contact.penalty import WallPenalty
@@ -45,8 +45,8 @@ class CellCase(Checked):
     times the volume at rest. contact: 'auto': walls that touch are held apart by the `penalty`;
     'third-medium': by the `medium` in the gap; 'none': they pass through each other. graded: elements shrink
     to mesh_size * EDGE at the body's edges, where stresses are singular; of hexahedra there is one layer of
-    this thickness on each side of the planes in which those edges lie. element: tetrahedra of gmsh's, or
-    hexahedra of a sheared grid.
+    this thickness on each side of the planes in which those edges lie. element: hexahedra of a sheared
+    grid, or gmsh's tetrahedra.
     """
 
     segment: Segment
@@ -60,7 +60,7 @@ class CellCase(Checked):
     penalty: WallPenalty = WallPenalty()
     medium: ThirdMedium = ThirdMedium()
     graded: bool = quantity(None, False)
-    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
+    element: str = quantity(None, USUAL_ELEMENT, choices=tuple(ELEMENTS))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -109,8 +109,7 @@ def cell_from_tables(data: dict[str, Any], where: str) -> CellCase:
 
 
 def cell_tables(case: CellCase) -> dict[str, Any]:
-    """The complete tables of a CellCase, which cell_from_tables reads back. The usual element is not written:
-    cases that were finished before there was a choice keep their names."""
+    """The complete tables of a CellCase, which cell_from_tables reads back."""
     segment = case.segment
     tables = to_table(case) | {
         "material": material_to_table(segment.material),
@@ -119,6 +118,4 @@ def cell_tables(case: CellCase) -> dict[str, Any]:
     }
     if segment.layer_material is not None:
         tables["layer_material"] = material_to_table(segment.layer_material)
-    if case.element == "tetrahedra":
-        del tables["element"]
     return tables

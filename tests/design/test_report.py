@@ -87,7 +87,7 @@ def test_verdict_tells_numbers_bars_and_possible_causes(tmp_path, monkeypatch):
     make_run(tmp_path / "a", (PLANE,), pressure=0.001, fields=False)
     told = verdict(*judged(tmp_path / "a"))
     assert f"|k| of a segment by up to {100 * (1 / FACTOR - 1):.0f} % (bar 5 %). Beyond the bar" in told
-    assert "possible causes: the mesh (2 mm; " in told and "a material" not in told
+    assert "possible causes: the mesh (1.5 mm; " in told and "a material" not in told
     record = tmp_path / "a" / "solve" / "run.json"
     record.write_text(record.read_text().replace('"ranks": 2', '"ranks": 2, "mesh_size_mm": 3.5'))
     run, c = judged(tmp_path / "a")

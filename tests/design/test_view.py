@@ -229,7 +229,7 @@ def test_a_browser_shows_it_within_the_report_and_not_in_print(finger):
         def inside(script):
             return script.replace("document.", f"{FRAME}.document.").replace("Plotly.", f"{FRAME}.Plotly.")
 
-        browser.wait_for(inside(f"!!{RAIL} && !!document.querySelector('canvas') && !!{FRAME}.Plotly"))
+        browser.wait_for(inside(f"!!{RAIL} && !!document.querySelector('canvas') && !!Plotly.newPlot"))
         assert int(browser.evaluate(inside(SHOT)).split()[0]) > 3000
         place = browser.evaluate(
             f"((f, r) => [f.left + r.left, f.top + r.top + r.height / 2])"

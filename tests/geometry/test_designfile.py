@@ -37,7 +37,8 @@ DESIGN = DesignFile(
     0.0364,
     name="three pieces",
     base_pose=se3.make_pose(se3.exp_rotation([0.3, -0.2, 1.0]), [1.0, 2.0, 3.0]),
-    mesh_size=1.5,
+    mesh_size=2.5,
+    element="tetrahedra",
     target="a b.csv",
     loads=DeadLoads(gravity=(0.0, 0.0, -9810.0), tip_moment=(0.0, 1.5, 0.0)),
     control=Control("volume", volume_factor=4.0),
@@ -60,7 +61,17 @@ def test_a_design_reads_back_as_it_was(tmp_path):
     back = read_design_file(path)
     assert back.manipulator == DESIGN.manipulator
     assert back.base_pose == pytest.approx(DESIGN.base_pose, abs=1e-15)
-    for name in ("pressure", "name", "mesh_size", "target", "result", "loads", "control", "measure"):
+    for name in (
+        "pressure",
+        "name",
+        "mesh_size",
+        "element",
+        "target",
+        "result",
+        "loads",
+        "control",
+        "measure",
+    ):
         assert getattr(back, name) == getattr(DESIGN, name), name
     first = path.read_text()
     write_design_file(path, back)
@@ -110,7 +121,7 @@ def test_a_short_file_has_the_defaults(tmp_path):
     path.write_text(MINIMAL)
     design = read_design_file(path)
     assert design.manipulator.segments == (Segment("one-sided", 60.0, 3, material=NeoHookean(mu=0.3)),)
-    assert (design.pressure, design.mesh_size) == (0.02, 2.0)
+    assert (design.pressure, design.mesh_size) == (0.02, 1.5)
     assert (design.base_pose == np.eye(4)).all()
 
 

@@ -18,7 +18,7 @@ BOTH = Manipulator((TWISTING, replace(ONE_SIDED, width=10.0)))
 @pytest.fixture(scope="module")
 def meshed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("a mesh")
-    return folder, mesh.mesh_manipulator(BOTH, 4.0, folder)
+    return folder, mesh.mesh_manipulator(BOTH, 4.0, folder, "tetrahedra")
 
 
 def test_facts_agree_with_the_cad(meshed):
@@ -74,7 +74,7 @@ def test_each_pressure_group_has_a_closed_cavity_between_bulkheads(tmp_path):
     bend = replace(ONE_SIDED, angle=90.0, chambers=1)
     other = replace(bend, roll=180, group=2)
     body = Manipulator((bend, other, other.plain(8.0)))
-    facts = mesh.mesh_manipulator(body, 4.0, tmp_path)
+    facts = mesh.mesh_manipulator(body, 4.0, tmp_path, "tetrahedra")
     stored, _ = read_mesh(tmp_path / MESH)
     total = 0.0
     for group, ends in enumerate(body.channels, start=1):
@@ -91,12 +91,11 @@ def test_each_pressure_group_has_a_closed_cavity_between_bulkheads(tmp_path):
 
 
 def test_a_rounded_body_meshes_in_tetrahedra_alone(tmp_path):
-    body = Manipulator((replace(ONE_SIDED, chambers=1, fillet=0.4),))
-    facts = mesh.mesh_manipulator(body, 2.0, tmp_path)
-    sharp = mesh.mesh_manipulator(Manipulator((replace(ONE_SIDED, chambers=1),)), 2.0, tmp_path)
-    assert facts["segments"][0]["fillet_mm"] == 0.4 and "fillet_mm" not in sharp["segments"][0]
+    body, sharp = (Manipulator((replace(ONE_SIDED, chambers=1, fillet=r),)) for r in (0.4, 0.0))
+    facts, of_sharp = (mesh.mesh_manipulator(b, 2.0, tmp_path, "tetrahedra") for b in (body, sharp))
+    assert facts["segments"][0]["fillet_mm"] == 0.4 and "fillet_mm" not in of_sharp["segments"][0]
     assert facts["mesh_volume_mm3"] == pytest.approx(facts["body_mm3"], rel=5e-3)
-    assert facts["cavity_mm3"] < 0.999 * sharp["cavity_mm3"]
+    assert facts["cavity_mm3"] < 0.999 * of_sharp["cavity_mm3"]
     with pytest.raises(InputError, match="fillet_mm = 0.4: a grid of hexahedra has sharp edges"):
         mesh.mesh_manipulator(body, 2.0, tmp_path, "hexahedra")
     with pytest.raises(InputError, match="fillet_mm = 0.4: a cell has sharp edges"):
@@ -104,7 +103,7 @@ def test_a_rounded_body_meshes_in_tetrahedra_alone(tmp_path):
 
 
 def test_the_same_mesh_again(meshed, tmp_path):
-    again = mesh.mesh_manipulator(BOTH, 4.0, tmp_path)
+    again = mesh.mesh_manipulator(BOTH, 4.0, tmp_path, "tetrahedra")
     assert {k: v for k, v in again.items() if k != "seconds"} == {
         k: v for k, v in meshed[1].items() if k != "seconds"
     }
@@ -112,8 +111,10 @@ def test_the_same_mesh_again(meshed, tmp_path):
 
 @pytest.mark.parametrize("angle", [45.0, 135.0])
 def test_mirror_designs_mesh_to_equal_volumes(angle, tmp_path):
-    facts = mesh.mesh_manipulator(Manipulator((replace(ONE_SIDED, angle=angle),)), 4.0, tmp_path)
-    other = mesh.mesh_manipulator(Manipulator((replace(ONE_SIDED, angle=180 - angle),)), 4.0, tmp_path)
+    facts, other = (
+        mesh.mesh_manipulator(Manipulator((replace(ONE_SIDED, angle=a),)), 4.0, tmp_path, "tetrahedra")
+        for a in (angle, 180 - angle)
+    )
     assert facts["mesh_volume_mm3"] == pytest.approx(other["mesh_volume_mm3"], rel=1e-9)
     for name, area in facts["areas"].items():
         assert area == pytest.approx(other["areas"][name], rel=1e-9), name

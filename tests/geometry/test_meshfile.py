@@ -78,7 +78,7 @@ def test_hexahedra_are_read_and_refused_where_they_turn_inside_out(tmp_path):
 
 def test_an_unknown_element_is_refused(tmp_path):
     write_archive(tmp_path / "mesh.npz", SCHEMA, {"element": "pyramids"}, GOOD)
-    with pytest.raises(InputError, match="'pyramids' is none of tetrahedra, hexahedra"):
+    with pytest.raises(InputError, match="'pyramids' is none of hexahedra, tetrahedra"):
         read_mesh(tmp_path / "mesh.npz")
 
 

@@ -60,9 +60,13 @@ def test_moulds_are_closed_can_be_pulled_and_leave_the_body(name):
     assert (whole.manifold() - left).volume() < 1e-9 * whole.volume
 
 
-@pytest.mark.parametrize("name", ["both, two groups", "tapers"])
-def test_layers_volumes_are_the_cads(name):
-    body = Manipulator(BODIES[name] + (one_sided(roll=90, group=3), twisting(group=4)))
+@pytest.mark.parametrize(
+    "segments",
+    [BODIES["both, two groups"] + (one_sided(roll=90, group=2), twisting(group=3)), BODIES["tapers"]],
+    ids=["rolled", "tapers"],
+)
+def test_layers_volumes_are_the_cads(segments):
+    body = Manipulator(segments)
     with cad.session():
         volumes = cad.build(body)
     assert of_layers(body) == pytest.approx(volumes["body_mm3"], rel=1e-12)

@@ -173,9 +173,10 @@ def test_prescribed_curvature_leaves_the_other_strains_free(one_sided, tmp_path)
     """Holding k2 alone: its moment is what it takes, all other forces vanish; at the free value that moment
     does too."""
     path = tmp_path / "cell.npz"
-    free, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1), path)
+    free, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1, element="tetrahedra"), path)
     change = 0.002
-    bent, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1, {4: free.strains.k[1] + change}), path)
+    held = {4: free.strains.k[1] + change}
+    bent, _ = solve_cell(CellCase(one_sided, 0.02, 2.5, 1, held, element="tetrahedra"), path)
     assert bent.strains.k[1] == pytest.approx(free.strains.k[1] + change, abs=1e-12)
     forces = np.concatenate([bent.force, bent.moment])
     assert np.delete(forces, 4) == pytest.approx(np.zeros(5), abs=1e-6)
@@ -188,7 +189,8 @@ def test_volume_control_walks_through_the_limit_point_of_the_pressure(tmp_path):
     it."""
     segment = CASES["twist_w15"](angle=60.0, chambers=1, material=NeoHookean(0.208))
     states, limits = [], []
-    case = CellCase(segment, 0.05, 6.0, 8, control="volume", volume_factor=8.0, contact="none")
+    way = {"control": "volume", "volume_factor": 8.0, "contact": "none", "element": "tetrahedra"}
+    case = CellCase(segment, 0.05, 6.0, 8, **way)
     solve_cell(case, tmp_path / "cell.npz", states.append, limits.append)
     pressure, unstable = (np.array([getattr(s, name) for s in states]) for name in ("pressure", "unstable"))
     top = int(pressure.argmax())

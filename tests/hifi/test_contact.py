@@ -32,7 +32,7 @@ def tall():
 def run(segment, folder, contact, levels, **case):
     """(states, pressures of first touch) up to 10 kPa."""
     states, touches = [], []
-    case = CellCase(segment, PRESSURE, SIZE, levels, contact=contact, **case)
+    case = CellCase(segment, PRESSURE, SIZE, levels, contact=contact, element="tetrahedra", **case)
     solve_cell(case, folder / "cell.npz", states.append, on_touch=touches.append)
     return states, touches
 

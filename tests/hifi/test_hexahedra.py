@@ -225,3 +225,30 @@ def test_a_body_of_hexahedra_is_held_without_force(tmp_path):
     assert state.frames[-1, 2, 3] < -0.05  # it bends
     assert np.abs(force).max() < 1e-6 and np.abs(moment).max() < 1e-5
     solve.destroy()
+
+
+def test_walls_of_a_body_touch_as_their_energy_says(tmp_path):
+    """Forces are its slope, the tangent is theirs; two chambers are pushed together, with some noise."""
+    segment = replace(CASES["one_sided_w10"](60.0, 2), gap=0.1)
+    body = Manipulator([segment])
+    body_grid(body, 6.0).mesh().write(tmp_path / "body.npz", {})
+    solve = ManipulatorSolve(body, tmp_path / "body.npz", MPI.COMM_SELF, contact=WallPenalty())
+    problem, contact, random = solve.problem, solve.problem.contact, np.random.default_rng(7)
+    X = problem.nodes
+    beyond = X[:, 0] - segment.cot * X[:, 1] > segment.chamber_positions.mean()
+    array = np.zeros(len(problem.array))
+    array[problem.displacement_dofs] = random.normal(scale=5e-4, size=X.shape)
+    array[problem.displacement_dofs[:, 0]] -= beyond * 1.002 * segment.gap / segment.sin
+    problem.set_array(array)
+    forces, tangent = contact.residual(), contact.tangent()
+    assert solve.walls.distances().min() < 0 < contact.overreach
+    assert np.linalg.norm(contact.forces()) > 1e-2
+    way, ends = random.normal(size=len(array)), []
+    way[problem.fixed_dofs] = 0.0
+    for step in (1e-7, -1e-7):
+        problem.set_array(array + step * way)
+        ends.append((contact.energy(), contact.residual()))
+    energy, change = ((a - b) / 2e-7 for a, b in zip(*ends))
+    assert forces @ way == pytest.approx(energy, rel=1e-6)
+    assert np.linalg.norm(tangent @ way - change) < 1e-5 * np.linalg.norm(change)
+    solve.destroy()

@@ -21,7 +21,7 @@ from pneunet.hifi.verification import reference_case
 def meshed(manipulator, directory, size=3.0):
     comm = MPI.COMM_WORLD
     if comm.rank == 0:
-        mesh_manipulator(manipulator, size, directory)
+        mesh_manipulator(manipulator, size, directory, "tetrahedra")
     comm.barrier()
     return directory / "manipulator.npz"
 

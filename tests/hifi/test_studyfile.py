@@ -109,7 +109,7 @@ def test_the_tables_of_a_cell_read_back():
         angle=60.0, chambers=1, layer_thickness=0.5, layer_material=silicone("Mold Star 20T")
     )
     for case in (
-        CellCase(segment, 0.0123, 2.5, 3, {4: 0.002}),
+        CellCase(segment, 0.0123, 2.5, 3, {4: 0.002}, element="tetrahedra"),
         CellCase(CASES["twist_w12"](angle=45.0, chambers=1), 0.05, control="volume", volume_factor=3.0),
     ):
         assert cell_from_tables(cell_tables(case), "") == case

@@ -46,7 +46,7 @@ def finger(shared_directory):
     """(Manipulator, mesh file) of a small soft body."""
     manipulator = Manipulator((Segment("one-sided", 60.0, 2),))
     if MPI.COMM_WORLD.rank == 0:
-        mesh_manipulator(manipulator, 3.5, shared_directory)
+        mesh_manipulator(manipulator, 3.5, shared_directory, "tetrahedra")
     MPI.COMM_WORLD.barrier()
     return manipulator, shared_directory / "manipulator.npz"
 

@@ -19,6 +19,7 @@ from tests.hifi.test_manipulator import set_positions
 
 #: mm of undeformed length in one turn of the staircase that the reference body, 44 mm long, is wound to
 TURN = 35.0
+MESH = {"mesh_size": 4.0, "element": "tetrahedra"}
 TALL = Segment(
     "twisting",
     60.0,
@@ -125,7 +126,7 @@ def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory, caplog)
     """Tall chambers a millimetre apart: touching at about 7.5 kPa; the run goes on later and does not
     forget."""
     caplog.set_level("INFO", "pneunet")
-    design = DesignFile(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0, contact="none")
+    design = DesignFile(Manipulator((TALL,)), pressure=0.009, contact="none", **MESH)
     last = solve_design(design, shared_directory, fields=False)
     assert (
         last.touch.walls_overlap
@@ -159,7 +160,7 @@ def test_a_run_marks_all_it_writes_from_first_touch_on(shared_directory, caplog)
 
 def test_contact_holds_walls_apart_on_any_number_of_ranks_and_after_a_resumption(shared_directory, caplog):
     caplog.set_level("INFO", "pneunet")
-    design = DesignFile(Manipulator((TALL,)), pressure=0.009, mesh_size=4.0)
+    design = DesignFile(Manipulator((TALL,)), pressure=0.009, **MESH)
     last = solve_design(design, shared_directory, fields=False)
     again = solve_design(design, shared_directory, pressure=0.012, fields=False, resume=True)
     for m in (last, again):

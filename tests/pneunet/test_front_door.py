@@ -39,7 +39,7 @@ def test_the_readmes_five_lines(curve, monkeypatch, capsys):
     lines = fenced(ROOT / "README.md")
     assert "pn.inverse_design(target)" in lines and 'design.solve("out/mine", ranks=2)' in lines
     names = {}
-    exec(lines.replace("ranks=2", "ranks=2, pressure_kPa=5, mesh_size_mm=4, fields=False"), names)
+    exec(lines.replace("ranks=2", "ranks=2, pressure_kPa=5, mesh_size_mm=6, fields=False"), names)
     design, solved = names["design"], names["solved"]
     assert len(names["lines"]) == 3 and design.errors.rms < 1.0 and "design curve" in repr(design).lower()
     assert solved.pressure_kPa == pytest.approx(5) and np.linalg.norm(solved.tip) > 20

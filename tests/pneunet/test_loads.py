@@ -11,6 +11,7 @@ from pneunet.base.files.atomic import read_columns
 from pneunet.cli import main
 
 BODY = """mesh_size_mm = 5
+element = "tetrahedra"
 [material]
 mu_MPa = 0.208
 [[segment]]

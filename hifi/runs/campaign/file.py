@@ -12,7 +12,7 @@ from pneunet.base.materials.laws import material_to_table
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.base.system.processes import Limits
 from pneunet.geometry.designfile import segment_table
-from pneunet.geometry.meshfile import ELEMENTS
+from pneunet.geometry.meshfile import ELEMENTS, USUAL_ELEMENT
 from pneunet.geometry.parameters import KINDS, Segment
 from pneunet.hifi.runs.campaign.sample import PLACES, RANGES, prescribed_states, segments
 from pneunet.hifi.runs.cases import Case, case_limits
@@ -46,8 +46,8 @@ KEYS = (*quantities(Numbers), "kinds", "further", "mesh", "ranges", "edge_ranges
 
 @dataclass(frozen=True)
 class Mesh(Checked):
-    """What meshes of cells are like: gmsh's tetrahedra, of edge_size at the body's edges, or grids of
-    hexahedra, with a layer of edge_size at planes where stresses are singular. every: n-th designs, from the
+    """What meshes of cells are like: grids of hexahedra, with a layer of edge_size at planes where stresses
+    are singular, or gmsh's tetrahedra, of edge_size at the body's edges. every: n-th designs, from the
     first, are computed on it, and further ones where it is 1.
 
     alike: on grids, all designs have the elements of hifi.runs.campaign.sample.typical, for which the sizes
@@ -60,7 +60,7 @@ class Mesh(Checked):
     name: str = quantity(None)
     mesh_size: float = quantity("mm", low=0.02, high=20)
     edge_size: float | None = quantity("mm", None, low=0.02, high=20)
-    element: str = quantity(None, "tetrahedra", choices=tuple(ELEMENTS))
+    element: str = quantity(None, USUAL_ELEMENT, choices=tuple(ELEMENTS))
     alike: bool = quantity(None, False)
     levels: int | None = quantity(None, None, low=2, high=100)
     every: int = quantity(None, 1, low=1, high=10_000)
@@ -72,10 +72,8 @@ class Mesh(Checked):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What makes the mesh, in file units; tetrahedra are not mentioned."""
+        """What makes the mesh, in file units."""
         sizes = {key: value for key, value in to_table(self).items() if key.endswith("_mm")}
-        if self.element == "tetrahedra":
-            return sizes
         return sizes | {"element": self.element} | ({"alike": True} if self.alike else {})
 
     def prescribed_of(self, index: int) -> int:
@@ -121,7 +119,7 @@ def read_campaign(path: str | Path) -> Campaign:
     numbers = from_table(Numbers, {key: data[key] for key in quantities(Numbers) if key in data}, where)
     count, seed, table = numbers.designs, numbers.seed, asdict(numbers)
     common = {key: table[key] for key in ("levels", "top_pressure", "limit_share")}
-    meshes = _meshes(data.get("mesh", [{"name": "coarse", "mesh_size_mm": 2.0}]), where)
+    meshes = _meshes(data.get("mesh", [{"name": "coarse", "mesh_size_mm": 1.5}]), where)
     ranges = _ranges(data, "ranges", kinds, where, RANGES)
     edge_ranges = _ranges(data, "edge_ranges", kinds, where, ranges)
     further = _further(data, kinds, count, where)
