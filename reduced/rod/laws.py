@@ -94,11 +94,9 @@ class TurnedSection:
 
 class SegmentLaw(ABC):
     """What predicts the free strains of the middle of a long segment with chambers, in the segment's own axes
-    whatever its roll (reduced.rod.ends turns them); `name`: what --law calls it; `of_walls`:
-    where it knows `walls` from, in words."""
+    whatever its roll (reduced.rod.ends turns them); `name`: what --law calls it."""
 
     name: str
-    of_walls = "estimate by plates, which is early by a quarter"
 
     @abstractmethod
     def of(self, segment: Segment) -> SectionLaw:
@@ -158,6 +156,11 @@ class SegmentLaw(ABC):
                 found.append((0.0, self.strains(segment, pressure).vector))
         (low, before), (high, after) = found
         return (after - before) / (high - low) if high > low else np.zeros(6)
+
+    @property
+    def of_walls(self) -> str:
+        """Where it knows `walls` from, in words."""
+        return "estimate by plates, which is early by a quarter"
 
     def walls(self, segment: Segment, pressure: float) -> tuple[float, float]:
         """(part of the gap that facing walls of a segment have closed at a pressure in MPa, they touch from 1

@@ -48,17 +48,16 @@ class StatesWithSlopes:
         )
         return cls(strains, strains_by, np.zeros((n, 0)), np.zeros((n, 0, by)), *closed, *stretch)
 
-    def with_stretch(self, segments: Sequence[Segment], pressures: np.ndarray) -> "StatesWithSlopes":
-        """With the estimate of plates where the stretch is not known."""
+    def with_plates(self, segments: Sequence[Segment], pressures: np.ndarray) -> "StatesWithSlopes":
+        """With walls estimated as plates where the law does not know their stretch."""
         unknown = np.isnan(self.stretch)
         if not unknown.any():
             return self
-        stretch, by = _plates(wall_stretch_and_slopes, segments, pressures)
-        return replace(
-            self,
-            stretch=np.where(unknown, stretch, self.stretch),
-            stretch_by=np.where(unknown[:, None], by, self.stretch_by),
-        )
+        found = self.of_strains(self.strains, self.strains_by, segments, pressures)
+        names, known = ("closed", "stretch", "closed_by", "stretch_by"), ~unknown
+        for name in names:
+            getattr(found, name)[known] = getattr(self, name)[known]
+        return replace(self, **{name: getattr(found, name) for name in names})
 
     @property
     def rod_strains(self) -> RodStrains:

@@ -31,7 +31,6 @@ class TrainedLaw(SegmentLaw):
     kinds: dict[str, KindLaw]
     about: dict
     name: str = "trained"
-    of_walls = "the law's"
 
     def _kind(self, segment):
         if segment.kind not in self.kinds:
@@ -85,7 +84,7 @@ class TrainedLaw(SegmentLaw):
             for rows, law in self._by_kind(segments)
         ]
         states = StatesWithSlopes.of(found, numbers[:, : len(SHAPE)], pitch, P, mu)
-        return states.with_stretch(segments, P)
+        return states.with_plates(segments, P)
 
     def _numbers(self, segments):
         """As numbers_of; without stiffening for a kind whose law has not learned what that does."""
@@ -117,13 +116,18 @@ class TrainedLaw(SegmentLaw):
         numbers, _ = self._numbers([segment])
         return self._kind(segment).excess(numbers, np.array([pressure / segment.material.mu]))[0]
 
+    @property
+    def of_walls(self) -> str:
+        """As of SegmentLaw."""
+        return "the law's" if all(law.recorded for law in self.kinds.values()) else super().of_walls
+
     def walls(self, segment: Segment, pressure: float) -> tuple[float, float]:
         """As SegmentLaw.walls."""
         (numbers, _), p = self._numbers([segment]), np.array([pressure / segment.material.mu])
         law = self._kind(segment)
-        closed = law.closed(numbers, p, law.free_strains(numbers, p))
         if law.recorded is None:
-            return float(closed[0]), super().walls(segment, pressure)[1]
+            return super().walls(segment, pressure)
+        closed = law.closed(numbers, p, law.free_strains(numbers, p))
         return float(closed[0]), float(law.recorded_at(numbers, p)[0][0])
 
     def half_width(self, segment: Segment, pressure: float) -> np.ndarray:
