@@ -23,6 +23,7 @@ mesh_size_mm = 6
 element = "tetrahedra"
 prescribed = 2
 slopes = true
+stiffness_slopes = true
 """
 
 
@@ -51,10 +52,12 @@ def test_a_campaign_grows_and_its_states_are_those_of_one_potential(tmp_path):
     assert data.accepted.all() and data.held_out.tolist() == [False, True]
     assert (data.strains[data.case == 0] == first.strains).all()
     assert (tmp_path / "out" / "cells.md").read_text().startswith("# Data set of unit cells")
-    # derivatives by the shape, of designs that train a law
-    known = np.isfinite(data.strain_slopes[:, :9]).all(axis=(1, 2))
-    assert (known == ((data.case == 0) & ~data.prescribed)).all() and np.isnan(data.strain_slopes[:, 9]).all()
-    assert np.isfinite(data.stiffness_slopes[:, :9]).all(axis=(1, 2)).sum() == 1  # of the state at rest
+    # derivatives by shape and stiffening, of designs that train a law
+    known = np.isfinite(data.strain_slopes[:, :11]).all(axis=(1, 2))
+    assert (known == ((data.case == 0) & ~data.prescribed)).all() and np.isnan(
+        data.strain_slopes[:, 11]
+    ).all()
+    assert np.isfinite(data.stiffness_slopes[:, :11]).all(axis=(1, 2)).sum() == 1  # of the state at rest
     # from the data alone it goes on elsewhere
     text, again = campaign(1, tmp_path, 2, "other", "--extend", str(tmp_path / "out" / "cells.npz"))
     assert "2 of them are taken over" in text
