@@ -254,7 +254,7 @@ def _members(about, _):
 def _require_lists(about):
     """InputError for what stands in `about` under the right keys and is no such thing."""
     lists = ("shape", "stiffening", "statuses", "revisions")
-    wrong = [key for key in lists if not isinstance(about.get(key), list)]
+    wrong: list[Any] = [key for key in lists if not isinstance(about.get(key), list)]
     words = [word for key in lists if key not in wrong for word in about[key]]
     wrong += [kind for kind in about["kinds"] if kind not in FORBIDDEN]
     wrong += [mesh for mesh in about["meshes"] if not isinstance(mesh, dict) or "name" not in mesh]

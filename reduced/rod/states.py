@@ -89,10 +89,8 @@ class StatesWithSlopes:
         values[:, 3:6] /= pitch[:, None]
         by[:, 3:6] /= pitch[:, None, None]
         by[:, 3:6, :-2] -= (values[:, 3:6] / pitch[:, None])[:, :, None] * PITCH_BY
-        strains, closed, stretch, excess = (
-            (values[:, c], by[:, c]) for c in (slice(6), 6, 7, slice(8, None))
-        )
-        return cls(*strains, *excess, *closed, *stretch)
+        parts = [slice(6), slice(8, None), 6, 7]  # strains, excess, closed, stretch
+        return cls(*(a for part in parts for a in (values[:, part], by[:, part])))
 
 
 def _plates(estimate, segments, pressures):

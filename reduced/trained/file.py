@@ -52,8 +52,8 @@ def write_law(path: Path, law: TrainedLaw) -> None:
             k.stiffness.smooth,
             k.stiffness.contact,
         )
-        known += (k.recorded and k.recorded.process, k.mesh.strains, k.mesh.stiffness)
-        for name, found in zip(PROCESSES, known):
+        besides = k.recorded.process if k.recorded else None, k.mesh.strains, k.mesh.stiffness
+        for name, found in zip(PROCESSES, (*known, *besides)):
             for number, process in enumerate(found.processes if found else ()):
                 for f in fields(GaussianProcess):
                     value = np.asarray(getattr(process, f.name), SHORT.get(f.name))
@@ -92,8 +92,8 @@ def _processes(kind, names):
     coordinates = Coordinates(kind)
     inputs = coordinates.of_cell + 1
     strains, stiffness = len(coordinates.strain_parity), len(coordinates.stiffness_parity)
-    outputs = (1,), (1, strains - 1), (1,), (stiffness,), (1, stiffness - 1), (1, 1)
-    outputs += (1, strains - 1), (1, stiffness - 1)
+    outputs: list[tuple[int, ...]] = [(1,), (1, strains - 1), (1,), (stiffness,), (1, stiffness - 1), (1, 1)]
+    outputs += [(1, strains - 1), (1, stiffness - 1)]
     return {
         name: (inputs + more, of_each)
         for name, more, of_each in zip(PROCESSES, (0, 1, 0, 0, 1, 1, 0, 0), outputs)
@@ -161,19 +161,21 @@ def _read_kind(stored, kind):
         name: SideBySide(tuple(process(name, number) for number in range(len(outputs))))
         for name, (_, outputs) in there.items()
     }
-    closing, learned, start, smooth, contact, recorded, *mesh = PROCESSES
+    closing, learned, start, smooth, contact, recorded, mesh, mesh_stiffness = PROCESSES
     # of how walls close and touch, and of finer grids, there may be none
     known = Closing(kind, beside.get(closing)), beside[learned], beside[start]
     cheap = (stored[f"{kind}/{name}"] for name in ("remainder", "landmarks"))
-    path = FreePath(kind, *known, float(stored[f"{kind}/furthest"]), *cheap)
-    *left, uncertainty = (stored[f"{kind}/{name}"] for name in OF_MESH)
+    left, stiffness_left, uncertainty = (stored[f"{kind}/{name}"] for name in OF_MESH)
+    difference = MeshDifference(
+        kind, beside.get(mesh), beside.get(mesh_stiffness), left, stiffness_left, float(uncertainty)
+    )
     return KindLaw(
         kind,
-        path,
+        FreePath(kind, *known, float(stored[f"{kind}/furthest"]), *cheap),
         FreeStiffness(kind, beside[smooth], beside.get(contact)),
         Anharmonic(kind, *(stored[f"{kind}/anharmonic/{name}"] for name in ANHARMONIC)),
         Recorded(beside[recorded]) if recorded in beside else None,
-        MeshDifference(kind, *map(beside.get, mesh), *left, float(uncertainty)),
-        *(stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")),
+        difference,
+        **{name: stored[f"{kind}/{name}"] for name in ("quantile", "low", "high")},
         doubt=float(stored[f"{kind}/doubt"]),
     )
