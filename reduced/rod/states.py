@@ -89,8 +89,8 @@ class StatesWithSlopes:
         values[:, 3:6] /= pitch[:, None]
         by[:, 3:6] /= pitch[:, None, None]
         by[:, 3:6, :-2] -= (values[:, 3:6] / pitch[:, None])[:, :, None] * PITCH_BY
-        parts = [slice(6), slice(8, None), 6, 7]  # strains, excess, closed, stretch
-        return cls(*(a for part in parts for a in (values[:, part], by[:, part])))
+        strains, excess = (values[:, :6], by[:, :6]), (values[:, 8:], by[:, 8:])
+        return cls(*strains, *excess, values[:, 6], by[:, 6], values[:, 7], by[:, 7])
 
 
 def _plates(estimate, segments, pressures):
