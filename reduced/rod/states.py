@@ -89,8 +89,12 @@ class StatesWithSlopes:
         values[:, 3:6] /= pitch[:, None]
         by[:, 3:6] /= pitch[:, None, None]
         by[:, 3:6, :-2] -= (values[:, 3:6] / pitch[:, None])[:, :, None] * PITCH_BY
-        strains, excess = (values[:, :6], by[:, :6]), (values[:, 8:], by[:, 8:])
-        return cls(*strains, *excess, values[:, 6], by[:, 6], values[:, 7], by[:, 7])
+        return cls(
+            *(values[:, :6], by[:, :6]),
+            *(values[:, 8:], by[:, 8:]),
+            *(values[:, 6], by[:, 6]),
+            *(values[:, 7], by[:, 7]),
+        )
 
 
 def _plates(estimate, segments, pressures):
