@@ -21,8 +21,9 @@ from pneunet.geometry.shape_numbers import DIRECTIONS, STIFFENING, changed
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.system import CellSystem
 
-#: normal pitches or, for the angle, degrees; and of c10
-STEP, ANGLE_STEP, MATERIAL_STEP = 1e-4, 1e-2, 1e-3
+#: normal pitches or, for the angle, degrees; and of c10. Walls begin to push over micrometres: at a hundred
+#: times these steps slopes in contact are off by a tenth
+STEP, ANGLE_STEP, MATERIAL_STEP = 1e-6, 1e-4, 1e-5
 
 
 class StateSlopes:

@@ -217,7 +217,7 @@ def test_what_is_wrong_is_named(tmp_path, old, new, message):
 
 def test_fillets_read_back_and_need_tetrahedra(tmp_path):
     body = Manipulator((Segment("one-sided", 60.0, 2, fillet=0.4), Segment("twisting", 60.0, 2)))
-    write_design_file(tmp_path / "d.toml", DesignFile(body, 0.05))
+    write_design_file(tmp_path / "d.toml", DesignFile(body, 0.05, element="tetrahedra"))
     assert read_design_file(tmp_path / "d.toml").manipulator == body
     assert (tmp_path / "d.toml").read_text().count("fillet_mm = 0.4") == 1
     with pytest.raises(InputError, match='fillet_mm = 0.4: a grid of hexahedra .* element = "tetrahedra"'):
