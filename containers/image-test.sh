@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tests the image `pneunet`, as somebody whom it does not know: doctor, mpirun, one finite element case on 2 ranks
-# against the same case on this machine (to 1e-6), and all tests, or those that PNEUNET_IMAGE_TESTS names. What it leaves in out/image-test is what
-# `make bench ONLY=image` reads.
+# against the same case on this machine (to 1e-6), and all tests, or those that PNEUNET_IMAGE_TESTS names. What it
+# leaves in out/image-test is what `make bench ONLY=image` reads.
 set -euo pipefail
 
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"

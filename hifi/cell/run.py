@@ -116,7 +116,9 @@ def follow_path(
             control, first = LoadControl(), min(0.02 * mu, case.pressure)
         marks = tuple(np.linspace(start, target, case.levels + 1)[1:])
         path = EquilibriumPath(system, control, options, start)
-        path.newton.current = not medium  # the tangent that was measured at rest
+        # the tangent that was measured at rest leads the path, and is one of its factorisations
+        path.newton.current = not medium
+        effort["factorisations"] += path.newton.current
 
         def keep(step):
             nonlocal passed

@@ -85,8 +85,7 @@ def test_cells_on_ranks_and_a_killed_study_goes_on(tmp_path, file):
     slanted, straight = rows[2], rows[6]
     assert float(slanted["k1_rad_per_mm"]) > 3e-3 > 1e-3 > abs(float(straight["k1_rad_per_mm"]))
     assert float(straight["k2_per_mm"]) > 3e-3 and float(straight["largest_stretch"]) > 1.05
-    # the tangent that was measured at rest may lead all of the path
-    assert int(straight["steps"]) >= 2 and 0 <= int(straight["factorisations"]) < int(straight["steps"])
+    assert int(straight["steps"]) >= 2 and int(straight["factorisations"]) >= 1
     assert (tmp_path / "out" / "study.png").stat().st_size > 10_000
     text, again = study(1, file, tmp_path / "out")
     assert again == rows and "2 of 2 cases are finished" in text and "ETA" not in text
