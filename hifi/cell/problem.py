@@ -37,6 +37,9 @@ from pneunet.hifi.fem.potential import PotentialEnergy, Term
 from pneunet.hifi.fem.stretch import PrincipalStretch
 
 AIR_STIFFNESS = 1e-4  # of mu; stress-free at rest, objective
+#: of quadrature in the air: exact for its volume, which then depends on the air's walls alone. With fewer
+#: points the pressure pushes at inner nodes too, and air as soft as this buckles
+AIR_DEGREE = {"tetrahedron": 4, "hexahedron": 6}
 #: attributes that depend on where the nodes are
 _PLACED = ("segment", "nodes", "classes", "walls", "contact")
 
@@ -139,7 +142,7 @@ class CellProblem(MixedField):
         grad_y = ufl.grad(u) + ufl.as_matrix([[0, 0, 0], [0, 1, 0], [0, 0, 1]])
         E1 = ufl.unit_vector(0, 3)
         self.deformation_gradient = F = grad_y + ufl.outer(e + ufl.cross(k, y), E1)
-        J, air = ufl.det(F), self.cells(tags.AIR)
+        J, air = ufl.det(F), self.cells(tags.AIR, degree=AIR_DEGREE[self.cell_name])
         # energies are those of the whole pitch
         whole = fem.Constant(self.mesh, PETSc.ScalarType(float(len(self.turns))))
         mu = fem.Constant(self.mesh, PETSc.ScalarType(segment.material.mu))

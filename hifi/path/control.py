@@ -62,11 +62,13 @@ class VolumeControl(_Bordered):
     pressure.
 
     The energy's load term is -P V, so the gradient of the volume is minus the residual's derivative by the
-    load.
+    load. relative_tolerance: of the volume.
     """
 
     name = "volume"
-    relative_tolerance = 1e-10
+
+    def __init__(self, relative_tolerance: float = 1e-10):
+        self.relative_tolerance = relative_tolerance
 
     def told(self, parameter: float) -> str:
         return f"{parameter:.4g} mm3"

@@ -35,7 +35,7 @@ from pneunet.hifi.runs.campaign.sample import typical
 
 STATES = "states.json"
 #: the path is only a guide for what is computed on it
-SCOUT_TOLERANCE = 1e-5
+SCOUT_TOLERANCE, SCOUT_VOLUME_TOLERANCE = 1e-5, 1e-7
 #: of the volume at rest: first and largest step of the scout, and how far it goes; and the largest step on
 #: grids with edge layers, where strains at edges are large (measured: 4 factorisations in place of 19)
 FIRST, LARGEST, FURTHEST = 0.03, 0.5, 30.0
@@ -125,7 +125,7 @@ class Sampler:
         system, limit = self.system, None
         path = EquilibriumPath(
             system,
-            VolumeControl(),
+            VolumeControl(SCOUT_VOLUME_TOLERANCE),
             replace(self.options, relative_tolerance=SCOUT_TOLERANCE),
             system.volume(),
         )
