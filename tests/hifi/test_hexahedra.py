@@ -21,7 +21,7 @@ from pneunet.hifi.cell.slopes import StateSlopes
 from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
 from pneunet.hifi.cell.unfolding import unfolding
 from pneunet.hifi.contact.penalty import WallPenalty
-from pneunet.hifi.fem import surface
+from pneunet.hifi.fem import compat, surface
 from pneunet.hifi.path.control import LoadControl
 from pneunet.hifi.path.equilibrium import EquilibriumPath
 from pneunet.hifi.path.newton import NewtonOptions
@@ -199,6 +199,25 @@ def test_quadrilaterals_tile_the_channel_s_wall(tmp_path):
     a, b, c = (problem.nodes[facets[:, i]] for i in range(3))
     outward = np.einsum("ni,ni->n", np.cross(b - a, c - a), (a + c) / 2 * [0, 1, 1])
     assert (outward < 0).all()  # out of the body: towards the axis
+
+
+@pytest.mark.parametrize("name", ["one_sided_w10", "twist_w12"])
+def test_pressure_does_not_push_inside_the_air(name, tmp_path):
+    """Whatever the state, the air's volume depends on where its walls are alone."""
+    problem, _ = problem_of(name, tmp_path, size=6.0)
+    problem.strains.value[:] = [1.2, 0.05, -0.05, 0.03, 0.05, -0.04]
+    problem.array[:] = problem.expand(np.random.default_rng(3).normal(scale=0.01, size=problem.unknowns))
+    forces = []
+    for problem.pressure.value in (0.0, 1.0):
+        forces.append(problem.residual()[0])
+    pushing, cells = np.abs(forces[1] - forces[0]), compat.cell_dofs(problem.displacement_space)
+    air, body = (
+        problem.reduced[problem.displacement_dofs[cells[problem.cell_tags.find(tag)]]]
+        for tag in (tags.AIR, tags.BODY)
+    )
+    inside = np.setdiff1d(air, body)
+    assert len(inside) > 30
+    assert pushing[inside].max() < 1e-12 * pushing.max()
 
 
 def test_a_block_of_hexahedra_bends_as_it_should():
