@@ -36,10 +36,12 @@ from pneunet.hifi.runs.campaign.sample import typical
 STATES = "states.json"
 #: the path is only a guide for what is computed on it
 SCOUT_TOLERANCE, SCOUT_VOLUME_TOLERANCE = 1e-5, 1e-7
-#: of the volume at rest: first and largest step of the scout, and how far it goes; and the largest step on
-#: grids with edge layers, where strains at edges are large (measured: 4 factorisations in place of 19)
-FIRST, LARGEST, FURTHEST = 0.03, 0.5, 30.0
-LARGEST_WITH_LAYERS = 0.12
+#: of the volume at rest: first, smallest and largest step of the scout, and how far it goes
+STEPS, FURTHEST = (0.03, 3e-5, 0.5), 30.0
+#: on grids with edge layers, where strains at edges are large (measured: 4 factorisations in place of 19). A
+#: surface that is compressed beside an edge folds there, in waves as short as elements are, and no smaller step
+#: goes on: the path ends before
+STEPS_WITH_LAYERS = (0.03, 0.03, 0.12)
 #: a prescribed state is walked to in steps of at most this part of the way
 HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.1
 #: free states whose stiffness is differentiated by the shape, where the strains are: every n-th
@@ -68,8 +70,8 @@ def solve_campaign_case(inputs: dict, directory: Path) -> dict:
     part = settings.get("element") == "hexahedra"
     problem, mesh = _problem(segment, settings, path, part, apart)
     every = STIFFNESS_SLOPES_EVERY if inputs["stiffness_slopes"] else 0
-    largest = LARGEST_WITH_LAYERS if "edge_size_mm" in settings else LARGEST
-    sampler = Sampler(problem, directory, inputs["slopes"], every, apart, largest)
+    steps = STEPS_WITH_LAYERS if "edge_size_mm" in settings else STEPS
+    sampler = Sampler(problem, directory, inputs["slopes"], every, apart, steps)
     top, limit = sampler.scout(inputs["top_pressure"], inputs["limit_share"])
     sampler.free(top * np.arange(inputs["levels"] + 1) / inputs["levels"])
     if part and inputs["prescribed"]:
@@ -103,14 +105,12 @@ class Sampler:
     """The states of one cell.
 
     slopes: free states are differentiated, every n-th one's stiffness too (0: none). apart: walls that meet
-    are the path's end. largest_step: of the scout, over the volume at rest.
+    are the path's end. steps: STEPS of the scout.
     """
 
-    def __init__(
-        self, problem, directory, slopes=False, stiffness_slopes_every=0, apart=False, largest_step=LARGEST
-    ):
+    def __init__(self, problem, directory, slopes=False, stiffness_slopes_every=0, apart=False, steps=STEPS):
         self.problem, self.directory, self.apart = problem, directory, apart
-        self.every, self.largest_step = stiffness_slopes_every, largest_step
+        self.every, self.steps = stiffness_slopes_every, steps
         self.mu = problem.segment.material.mu
         self.system = CellSystem(problem)
         self.slopes = StateSlopes(problem) if slopes else None
@@ -143,7 +143,7 @@ class Sampler:
             run_steps(
                 path,
                 FURTHEST * rest,
-                StepSize(FIRST * rest, 1e-3 * FIRST * rest, self.largest_step * rest),
+                StepSize(*(step * rest for step in self.steps)),
                 keep,
             )
         except _Enough:
@@ -151,6 +151,8 @@ class Sampler:
         except ConvergenceError:
             # what the path has reached is used; that it ended is told below
             limit = max(a.load for a in self.walked)
+            if limit <= 0:
+                raise
         if path.limit_points:
             limit = path.limit_points[0].load
         highest = max(a.load for a in self.walked)
