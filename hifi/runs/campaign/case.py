@@ -39,8 +39,8 @@ SCOUT_TOLERANCE, SCOUT_VOLUME_TOLERANCE = 1e-5, 1e-7
 #: of the volume at rest: first, smallest and largest step of the scout, and how far it goes
 STEPS, FURTHEST = (0.03, 3e-5, 0.5), 30.0
 #: on grids with edge layers, where strains at edges are large (measured: 4 factorisations in place of 19). A
-#: surface that is compressed beside an edge folds there, in waves as short as elements are, and no smaller step
-#: goes on: the path ends before
+#: surface that is compressed beside an edge folds there, in waves as short as elements are. No smaller step
+#: goes on, and the path ends before
 STEPS_WITH_LAYERS = (0.03, 0.03, 0.12)
 #: a prescribed state is walked to in steps of at most this part of the way
 HOLD_STEP, SMALLEST_HOLD_STEP = 0.5, 0.1
