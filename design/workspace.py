@@ -104,7 +104,7 @@ class WorkspaceCase(Checked):
 
     @classmethod
     def read(cls, path: str | Path) -> "WorkspaceCase":
-        """The case in a TOML file (docs/use-design.md); InputError that names key and fix."""
+        """The case in a TOML file (docs/use-workspace.md); InputError that names key and fix."""
         table, where = read_toml(path), str(path)
         special = ("name", "angles_deg", "pressures_kPa", "chains", "material", "segment")
         refuse_unknown(table, (*quantities(cls), *special), where)

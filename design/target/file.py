@@ -1,4 +1,4 @@
-"""Reading a `Target` from a CSV of points or a TOML; docs/use-design.md shows the files.
+"""Reading a `Target` from a CSV of points or a TOML; docs/use-targets.md shows the files.
 
 Every bad input is one line that names the key and the fix.
 """

@@ -89,7 +89,7 @@ class Target:
 
     @classmethod
     def read(cls, path: str | Path) -> "Target":
-        """The Target in a CSV of points or a TOML (docs/use-design.md), or a shipped one by its name:
+        """The Target in a CSV of points or a TOML (docs/use-targets.md), or a shipped one by its name:
         'octopus'. InputError that names key and fix otherwise."""
         from pneunet.design.target.file import read_target
 
