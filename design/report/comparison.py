@@ -7,7 +7,6 @@ from scipy.interpolate import CubicSpline
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError
-from pneunet.base.materials.laws import NeoHookean
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report.labels import kPa, plain, significant
@@ -30,7 +29,8 @@ class Comparison:
 
     reduced: at the design pressure. solved: finite elements at their last pressure; reduced_at_solve,
     strains: the reduced model re-evaluated there. nearest: (pressure in MPa, Errors) of the step nearest to
-    the target. notes: what a reader must know to read the numbers rightly.
+    the target. notes: what a reader must know to read the numbers rightly. doubted: whether the law doubts
+    the design, as the notes then say.
     """
 
     reduced: np.ndarray | None
@@ -42,6 +42,7 @@ class Comparison:
     reduced_solved: Errors | None
     notes: tuple[str, ...]
     nearest: tuple[float, Errors] | None = None
+    doubted: bool = False
 
     @classmethod
     def of(cls, run: DesignFolder, law: SegmentLaw) -> "Comparison":
@@ -91,6 +92,7 @@ class Comparison:
             _errors(at_solve, solved),
             tuple(dict.fromkeys(notes)),
             nearest,
+            bool(doubted),
         )
 
 
@@ -204,7 +206,7 @@ def verdict(run: DesignFolder, comparison: "Comparison") -> str:
         )
         beyond = c.reduced_solved.percent(c.reduced_solved.rms) > POSITION_BAR or away > STRAIN_BAR
         if beyond and not overlaps(run):
-            sentence += f". Beyond the bar; possible causes: {_causes(run)}"
+            sentence += f". Beyond the bar; possible causes: {_causes(run, c)}"
     if promise:
         sentence += (
             f". F{promise[1:]}; at {pressure} the finite element body misses it by {_mm(c.solved_target)}"
@@ -237,15 +239,12 @@ def _strain_difference(run, comparison):
     return 100 * float(away / np.linalg.norm(solved, axis=1).max())
 
 
-def _causes(run):
+def _causes(run, comparison):
     """What, beside the reduced model itself, may have set prediction and finite elements apart."""
     size = run.solve.record.get("mesh_size_mm") or run.design.mesh_size
     coarse = size > USUAL_MESH
-    causes = [f"{'a coarse mesh' if coarse else 'the mesh'} ({size:g} mm; solve on a finer one to see)"]
-    others = sorted({m.law for m in run.design.manipulator.materials} - {NeoHookean.law})
-    if others:
-        causes.append(f"a material that the reduced model does not know ({', '.join(others)})")
-    return ", ".join(causes)
+    causes = f"{'a coarse mesh' if coarse else 'the mesh'} ({size:g} mm; solve on a finer one to see)"
+    return causes + ", what the law of the reduced model is in doubt about" * comparison.doubted
 
 
 def _mm(errors, bar=""):
