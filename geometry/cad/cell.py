@@ -40,14 +40,16 @@ def mesh_cell(
     half = segment.pitch / 2
     refuse_absurd(mesh_size, [(segment, segment.pitch, 1)])
     with cad.session("cell"):
-        body, air = _build(segment, half, cut, gaps)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
-        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-        gmsh.option.setNumber("Mesh.RandomSeed", 1)
-        if edge_size is not None:
-            _grade(half, edge_size, mesh_size)
         try:
+            body, air = _build(segment, half, cut, gaps)
+            gmsh.option.setNumber("Mesh.MeshSizeMax", mesh_size)
+            gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+            gmsh.option.setNumber("Mesh.RandomSeed", 1)
+            if edge_size is not None:
+                _grade(half, edge_size, mesh_size)
             gmsh.model.mesh.generate(3)
+        except InputError:
+            raise
         except Exception as error:  # gmsh raises plain Exception with its own text
             raise InputError(f"gmsh could not mesh this cell: {error}; try another mesh_size_mm") from None
         mesh = tetrahedral_mesh()
@@ -78,8 +80,7 @@ def _build(segment, half, cut, gaps):
             )
     solids = []
     for blocks, unify in ((outer, True), (inner, False)):
-        slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
-        solids.append(occ.intersect(cad.fuse(blocks, unify), [(3, slab)])[0])
+        solids.append(occ.intersect(cad.fuse(blocks, unify), [_slab(s, half)])[0])
     layer = []
     if s.layer_thickness:
         layer.append((3, cad.box(-half, half, s.width / 2, s.core_bottom, s.layer_top)))
@@ -115,8 +116,13 @@ def _gap_solids(segment, half, centres):
         for x in centres
         for side in s.sides
     ]
-    slab = cad.box(-half, half, s.width, -2 * s.chamber_top, 2 * s.chamber_top)
-    return gmsh.model.occ.intersect(solids, [(3, slab)])[0]
+    return gmsh.model.occ.intersect(solids, [_slab(s, half)])[0]
+
+
+def _slab(segment, half):
+    """(3, tag) of all that lies between the cuts, wider and higher than the body."""
+    top = 2 * segment.chamber_top
+    return 3, cad.box(-half, half, segment.width, min(-top, 2 * segment.core_bottom), top)
 
 
 def _on_cut(face, half):

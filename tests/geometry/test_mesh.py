@@ -9,6 +9,7 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.geometry import Manipulator, Segment, tags
 from pneunet.geometry.cad import cell, mesh
+from pneunet.geometry.grids.cell import cell_grid
 from pneunet.geometry.meshfile import MESH, open_edges, read_mesh, volumes_and_quality
 
 ONE_SIDED, TWISTING = Segment("one-sided", 70.0, 2), Segment("twisting", 60.0, 2, gap=2.0, cavity_floor=0.5)
@@ -128,6 +129,13 @@ def test_a_mesh_beyond_any_memory_is_refused_at_once(size, tmp_path):
     with pytest.raises(InputError, match="mesh_size_mm = .* choose a coarser mesh"):
         cell.mesh_cell(replace(ONE_SIDED, width=500.0, wall=0.05), size, tmp_path / "cell.npz")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cell_with_a_base_thicker_than_its_chambers_are_high_is_whole(tmp_path):
+    body = replace(ONE_SIDED, base_thickness=12.0, chamber_height=3.0)
+    grid = cell_grid(body, 6.0).mesh()
+    facts = cell.mesh_cell(body, 6.0, tmp_path / "cell.npz")
+    assert facts["body_mm3"] == pytest.approx(grid.volumes().sum(), rel=1e-9)
 
 
 def test_nothing_is_left_of_a_mesh_that_fails(tmp_path, monkeypatch):
