@@ -8,7 +8,7 @@ import numpy as np
 
 from pneunet.geometry import tags
 from pneunet.geometry.cad.body import session
-from pneunet.geometry.cad.meshing import HEXAHEDRON, QUADRILATERAL, save
+from pneunet.geometry.cad.meshing import HEXAHEDRON, QUADRILATERAL, refuse_absurd, save
 from pneunet.geometry.grids.cell import HALF_TURNS, cell_grid
 from pneunet.geometry.meshfile import VolumeMesh
 from pneunet.geometry.parameters import Segment
@@ -24,7 +24,10 @@ def grid_cell(
     like: Segment | None = None,
 ) -> dict[str, Any]:
     """Write the mesh of geometry.grids.cell.cell_grid to `path`, an .npz, and beside it gmsh's .msh; returns
-    {"body_mm3", "air_mm3", "cells", "part"}, volumes of the whole pitch."""
+    {"body_mm3", "air_mm3", "cells", "part"}, volumes of the whole pitch. InputError when there would be too
+    many elements."""
+    sized = like or segment
+    refuse_absurd(size, [(sized, sized.pitch, 1)])
     mesh = cell_grid(segment, size, layer, gaps, part, like).mesh(air=True)
     volumes, copies = mesh.volumes(), 1 + part * len(HALF_TURNS[segment.kind])
     air, medium = mesh.cell_tags == tags.AIR, mesh.cell_tags == tags.GAP

@@ -9,6 +9,7 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.geometry import Manipulator, Segment, tags
 from pneunet.geometry.cad import cell, mesh
+from pneunet.geometry.cad.grid import grid_cell
 from pneunet.geometry.grids.cell import cell_grid
 from pneunet.geometry.meshfile import MESH, open_edges, read_mesh, volumes_and_quality
 
@@ -126,8 +127,9 @@ def test_a_mesh_beyond_any_memory_is_refused_at_once(size, tmp_path):
     long = Manipulator((replace(ONE_SIDED, chambers=30),))
     with pytest.raises(InputError, match="mesh_size_mm = .* choose a coarser mesh"):
         mesh.mesh_manipulator(long, size, tmp_path / "mesh")
-    with pytest.raises(InputError, match="mesh_size_mm = .* choose a coarser mesh"):
-        cell.mesh_cell(replace(ONE_SIDED, width=500.0, wall=0.05), size, tmp_path / "cell.npz")
+    for mesh_cell in (cell.mesh_cell, grid_cell):
+        with pytest.raises(InputError, match="mesh_size_mm = .* choose a coarser mesh"):
+            mesh_cell(replace(ONE_SIDED, width=500.0, wall=0.05), size, tmp_path / "cell.npz")
     assert list(tmp_path.iterdir()) == []
 
 
