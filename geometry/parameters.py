@@ -19,7 +19,7 @@ from pneunet.base.materials.laws import BODY_LIMITS, Hyperelastic, NeoHookean
 from pneunet.base.quantities import Checked, quantities, quantity
 from pneunet.geometry.fillets import check_fillet
 from pneunet.geometry.sections import joint_is_covered
-from pneunet.geometry.tags import MOST_GROUPS
+from pneunet.geometry.tags import MOST_GROUPS, MOST_SEGMENTS
 
 ONE_SIDED, TWISTING, PASSIVE = "one-sided", "twisting", "passive"
 #: with chambers: what a unit cell can be of, and a law can learn
@@ -310,8 +310,8 @@ class Manipulator:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", tuple(self.segments))
-        if not self.segments:
-            raise InputError("segment: at least one [[segment]] is needed")
+        if not 1 <= len(self.segments) <= MOST_SEGMENTS:
+            raise InputError(f"segment: {len(self.segments)} [[segment]]: 1 to {MOST_SEGMENTS} make a body")
         for i, (a, b) in enumerate(zip(self.segments, self.segments[1:]), start=1):
             if not joint_is_covered(a, b):
                 raise InputError(

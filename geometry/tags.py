@@ -7,6 +7,8 @@ _OF_A_GROUP, MOST_GROUPS = 10, 9
 #: volumes: BODY + segment index, bottom layers LAYER + segment index; of a cell also its air and its gaps
 BODY, LAYER = 100, 300
 AIR, GAP = 200, 400
+#: of a body, so that the tags of volumes keep apart
+MOST_SEGMENTS = AIR - BODY
 
 
 def cavity_tags(group: int) -> tuple[int, int]:

@@ -144,8 +144,6 @@ def test_manipulator_adds_up():
 
 
 def test_joints_that_do_not_fit_are_refused():
-    with pytest.raises(InputError, match="at least one \\[\\[segment\\]\\]"):
-        Manipulator(())
     tall = replace(ONE_SIDED, channel_height=6.0, chamber_height=8.0)
     with pytest.raises(InputError, match="segment 2 and 3: the channel of one does not fit into the core"):
         Manipulator((ONE_SIDED, ONE_SIDED, tall))
@@ -181,6 +179,13 @@ def test_a_roll_turns_the_section_right_handedly_and_leaves_the_cell():
         s = replace(ONE_SIDED, roll=roll)
         assert whole_section(s).tolist() == section and s.key == ONE_SIDED.key
         assert whole_section(s.mirrored).tolist() == [[-section[0][1], -section[0][0]], section[1]]
+
+
+def test_a_body_has_no_more_segments_than_tags_tell_apart():
+    assert len(Manipulator((ONE_SIDED,) * 100).segments) == 100
+    for count in (0, 101):
+        with pytest.raises(InputError, match=rf"segment: {count} \[\[segment\]\]: 1 to 100"):
+            Manipulator((ONE_SIDED,) * count)
 
 
 def test_rolled_joints_fit_where_either_channel_stays_covered():
