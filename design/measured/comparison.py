@@ -149,25 +149,21 @@ class MeasuredComparison:
     @cached_property
     def consequences(self) -> dict:
         """What the fit would change in the design, by file key: its pressure for the shape that was designed,
-        how far the tip is off at the old one, and with a target the RMS distances from it."""
+        how far the tip is off at the old one, and with a target the RMS distances from it; None for what the
+        law finds no equilibrium of."""
         if self.fit is None:
             return {}
-        content, f = self.design.content, self.fit.change.modulus
-        kPa = content.largest_pressure * KPA_PER_MPA
-        probe = replace(self.measured, pressures=MPA_PER_KPA * np.array([kPa, f * kPa]))
-        predicted = replace(self.predicted, measured=probe)
-        wanted, _ = predicted.lines()
-        now, then = predicted.lines(self.fit.change)
-        out = {
-            "design_pressure_kPa": kPa,
-            "pressure_for_the_shape_kPa": f * kPa,
-            "tip_off_at_design_pressure_mm": float(np.linalg.norm(now.points[-1] - wanted.points[-1])),
-            "tip_off_at_that_pressure_mm": float(np.linalg.norm(then.points[-1] - wanted.points[-1])),
-        }
+        change, P = self.fit.change, self.design.content.largest_pressure
+        kPa, line = P * KPA_PER_MPA, self.predicted.line
+        wanted, now, then = line(P), line(P, change), line(change.modulus * P, change)
+        out: dict = {"design_pressure_kPa": kPa, "pressure_for_the_shape_kPa": change.modulus * kPa}
+        for key, found in (("design", now), ("that", then)):
+            tips = None if found is None or wanted is None else found.points[-1] - wanted.points[-1]
+            out[f"tip_off_at_{key}_pressure_mm"] = None if tips is None else float(np.linalg.norm(tips))
         if self.design.target is not None:
-            for key, line in (("designed", wanted), ("cast", now), ("cast_at_that_pressure", then)):
-                errors = compare_curves(line.points, self.design.target.curve)
-                out[f"target_rms_{key}_mm"] = errors.rms
+            for key, found in (("designed", wanted), ("cast", now), ("cast_at_that_pressure", then)):
+                errors = None if found is None else compare_curves(found.points, self.design.target.curve)
+                out[f"target_rms_{key}_mm"] = None if errors is None else errors.rms
         return out
 
     def corrected(self) -> DesignFile:
@@ -251,10 +247,11 @@ class MeasuredComparison:
         out.append(f"best fit: {told}; RMS {f.rms:.3g} {unit}")
         if f.at_the_edge:
             return [*out, "no modulus in reach fits: is it this body, in these units?"]
+        off = c["tip_off_at_design_pressure_mm"]
         out.append(
             f"so the shape designed for {c['design_pressure_kPa']:.4g} kPa needs"
-            f" {c['pressure_for_the_shape_kPa']:.4g} kPa; at {c['design_pressure_kPa']:.4g} kPa the tip is"
-            f" {c['tip_off_at_design_pressure_mm']:.3g} mm off"
+            f" {c['pressure_for_the_shape_kPa']:.4g} kPa; at {c['design_pressure_kPa']:.4g} kPa"
+            + (" the law finds no equilibrium" if off is None else f" the tip is {off:.3g} mm off")
         )
         return out
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pneunet.base import se3
 from pneunet.base.curve import Curve
-from pneunet.base.errors import InputError
+from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.design.measured.registration import line_of, register, turned_about
 from pneunet.design.measured.table import ANGLE, CENTRELINE, DISPLACEMENT, MARKERS, STATIONS, Measurement
 from pneunet.geometry.designfile import DesignFile
@@ -106,6 +106,15 @@ class Predicted:
             rod = Rod.of(body, laws, self._scaled(pressure / f), self.design.base_pose)
             found.append(rod.equilibrium(over).line if loads else rod.free(SPACING))
         return found
+
+    def line(self, pressure: float, change: Change = Change()) -> Centreline | None:
+        """The Centreline at a pressure (MPa) that need not have been measured; None where there is no
+        equilibrium."""
+        alone = replace(self, measured=replace(self.measured, pressures=np.array([pressure])))
+        try:
+            return alone.lines(change)[0]
+        except (ConvergenceError, InputError):
+            return None
 
     def _scaled(self, pressure):
         """Of every group of segments, the largest of them `pressure` (MPa)."""

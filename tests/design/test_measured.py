@@ -92,6 +92,16 @@ def test_a_modulus_put_in_is_found(tmp_path):
     assert found.corrected().manipulator.segments[0].material.mu == pytest.approx(FACTOR * MU, rel=1e-6)
 
 
+def test_a_design_beyond_the_limit_load_of_what_was_cast_is_compared_all_the_same(tmp_path):
+    """The analytic law has no equilibrium beyond P/mu = 0.61."""
+    for factor, off in ((3.5, pytest.approx(30, abs=20)), (0.4, None)):
+        path = write_markers(tmp_path / "m.csv", design(factor * MU))
+        found = compare(design(pressure=60.0), path, markers=tmp_path / "markers.csv")
+        assert found.consequences["pressure_for_the_shape_kPa"] == pytest.approx(60 * factor, rel=1e-6)
+        assert found.consequences["tip_off_at_design_pressure_mm"] == off
+        assert ("no equilibrium" in found.lines()[-1]) == (off is None)
+
+
 def test_its_own_prediction_is_measured_without_error(tmp_path):
     path = write_markers(tmp_path / "m.csv", design(), unit="in", per_unit=25.4)
     found = compare(design(), path, markers=tmp_path / "markers.csv")
