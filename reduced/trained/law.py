@@ -26,11 +26,11 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class TrainedLaw(SegmentLaw):
-    """kinds: {kind: KindLaw}; about: how it was trained."""
+    """kinds: {kind: KindLaw}; about: how it was trained; name: as of SegmentLaw, which gives it again."""
 
     kinds: dict[str, KindLaw]
     about: dict
-    name: str = "trained"
+    name: str
 
     def _kind(self, segment):
         if segment.kind not in self.kinds:

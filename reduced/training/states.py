@@ -169,9 +169,10 @@ def _closing(data, rows, coordinates):
 
 
 def folds(designs: np.ndarray, parts: int) -> list[np.ndarray]:
-    """[numbers of one part] of designs, dealt out at random, the same for the same designs."""
+    """[numbers of one part] of designs, dealt out at random, the same for the same designs; as many parts as
+    there are designs, where these are fewer."""
     part = np.random.default_rng(0).permutation(len(designs)) % parts
-    return [designs[part == f] for f in range(parts)]
+    return [designs[part == f] for f in range(min(parts, len(designs)))]
 
 
 def splits(training: Sample, held_out: Sample) -> list[tuple[Sample, Sample]]:

@@ -35,7 +35,7 @@ Samples = dict[str, tuple[Sample, Sample]]
 def samples_of(data: CellData) -> Samples:
     """{kind: (training Sample, held-out Sample)} of the kinds of which there are enough; InputError where
     there is none."""
-    out = {}
+    out, text = {}, "it holds none"
     for kind in data.about["kinds"]:
         training, held_out = (sample_of(data, kind, held) for held in (False, True))
         designs, held = len(training.designs), len(held_out.designs)
@@ -91,9 +91,8 @@ def _train(path, out, compare, mapping, like):
             compared[kind] = {"laws": next(tables), "learning curve": next(tables)}
             lines += [*law_table(compared[kind]["laws"]), *curve_table(compared[kind]["learning curve"])]
     about |= {"data": Path(path).name, "data_sha256": digest(path), "revisions": data.about["revisions"]}
-    law = TrainedLaw(
-        laws, about | {"figures": judged, "held_out": held_out_figures(laws, samples), "compared": compared}
-    )
+    found = {"figures": judged, "held_out": held_out_figures(laws, samples), "compared": compared}
+    law = TrainedLaw(laws, about | found, str(out))
     write_law(out, law)
     write_text(Path(out).with_suffix(".md"), "\n".join(lines) + "\n")
     for line in lines:

@@ -28,6 +28,8 @@ def test_a_kind_of_few_designs_is_left_out_and_said(caplog):
     )
     with pytest.raises(InputError, match="too few accepted designs of any kind"):
         samples_of(replace(data, status=np.ones_like(data.status)))
+    with pytest.raises(InputError, match="too few accepted designs of any kind .*it holds none"):
+        samples_of(replace(data, about=data.about | {"kinds": []}))
 
 
 def test_how_far_walls_close_is_known_up_to_the_first_state_in_touch():

@@ -52,6 +52,11 @@ def test_few_held_out_designs_are_joined_by_every_training_design_once():
     assert len(splits(training, sample(np.arange(100, 100 + ENOUGH)))) == 1
 
 
+def test_fewer_designs_than_parts_are_a_part_each():
+    _, *parts = splits(replace(sample(np.arange(37)), drawn=4), sample(np.arange(100, 110)))
+    assert sorted(judged.designs.tolist() for _, judged in parts) == [[0], [1], [2], [3]]
+
+
 def test_designs_that_were_chosen_teach_and_do_not_judge():
     _, *parts = splits(replace(sample(np.arange(37)), drawn=20), sample(np.arange(100, 110)))
     assert sorted(np.concatenate([judged.designs for _, judged in parts])) == list(range(20))
