@@ -3,18 +3,22 @@ tests/pneunet/test_campaign.py."""
 
 import json
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pneunet.base.errors import InputError
+from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.dataset import write_dataset
 from pneunet.base.materials.laws import NeoHookean, material_to_table
 from pneunet.geometry.designfile import segment_table
 from pneunet.geometry.parameters import ONE_SIDED, TWISTING
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import SHAPE, shape_numbers
+from pneunet.hifi.path.equilibrium import PathState
+from pneunet.hifi.path.newton import NewtonOptions
+from pneunet.hifi.runs.campaign import case
 from pneunet.hifi.runs.campaign.case import first_touch, prescribed_change, solve_campaign_case
 from pneunet.hifi.runs.campaign.extension import taken_over
 from pneunet.hifi.runs.campaign.file import EDGES, on_offer, read_campaign
@@ -152,6 +156,25 @@ def test_a_case_on_a_grid_takes_half_a_cell_and_may_end_where_walls_touch(gap, a
     assert (last["contact_force"] > 0) == touch and last["wall_distance"] > 0
 
 
+@pytest.mark.parametrize(("apart", "why"), [(False, "no step at all"), (True, "nearly touch")])
+def test_a_path_that_reaches_nothing_is_no_case_with_a_limit_load_of_0(apart, why, monkeypatch):
+    def nowhere(path, target, size, keep):
+        if apart:
+            keep(None)
+        raise ConvergenceError("no step at all")
+
+    rest = SimpleNamespace(parameter=1.0, accepted=[PathState(1.0, 0.0, np.zeros(1), 1.0)], limit_points=[])
+    monkeypatch.setattr(case, "EquilibriumPath", lambda *arguments: rest)
+    monkeypatch.setattr(case, "run_steps", nowhere)
+    sampler = case.Sampler.__new__(case.Sampler)
+    sampler.apart, sampler.options, sampler.largest_step = apart, NewtonOptions(), 0.5
+    walls = SimpleNamespace(distance=lambda: 0.0)
+    sampler.system = SimpleNamespace(volume=lambda: 1.0, walls=walls)
+    sampler.problem = SimpleNamespace(segment=CASES["one_sided_w10"](60.0, 1))
+    with pytest.raises(ConvergenceError, match=why):
+        sampler.scout(0.3, 0.9)
+
+
 def test_prescribed_states_are_of_the_whole_cell_and_start_from_the_part_s(tmp_path):
     segment = replace(CASES["one_sided_w10"](60.0, 1), material=NeoHookean(1.0))
     prescribed = [asdict(p) for p in prescribed_states(ONE_SIDED, 1, 2, 1)[0]]
@@ -228,6 +251,10 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
         ('kinds = ["both"]', "'one-sided', 'twisting'"),
         ('[[mesh]]\nname = "a"', "mesh_size_mm' is missing"),
         ('[[mesh]]\nname = "a"\nmesh_size_mm = 2\nslopes = 1', "'slopes' must be true or false, not 1"),
+        (
+            '[[mesh]]\nname = "a"\nmesh_size_mm = 2\nelement = "tetrahedra"\nalike = true',
+            "alike = true: .*hexahedra",
+        ),
         ("[ranges.one-sided]\nwall_mm = [2, 1]", "write the lower value first"),
         ("[ranges.one-sided]\nangle_deg = [10, 20]", "must lie in 30..150"),
         (

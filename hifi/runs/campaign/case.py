@@ -121,7 +121,8 @@ class Sampler:
 
     def scout(self, top: float, share: float) -> tuple[float, float | None]:
         """(top pressure, limit pressure or None), MPa: `top`, or `share` of the limit load where that is
-        less; or, of walls that stay apart, where they nearly touch."""
+        less; or, of walls that stay apart, where they nearly touch. ConvergenceError where nothing is
+        reached."""
         system, limit = self.system, None
         path = EquilibriumPath(
             system,
@@ -149,6 +150,8 @@ class Sampler:
         except _Enough:
             pass
         except ConvergenceError:
+            if len(self.walked) == 1:
+                raise
             # what the path has reached is used; that it ended is told below
             limit = max(a.load for a in self.walked)
             if limit <= 0:
@@ -156,6 +159,8 @@ class Sampler:
         if path.limit_points:
             limit = path.limit_points[0].load
         highest = max(a.load for a in self.walked)
+        if len(self.walked) == 1:
+            raise ConvergenceError("walls that are to stay apart nearly touch within the first step")
         if limit is None and highest < top:
             if self.apart:
                 return highest, None

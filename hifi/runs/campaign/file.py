@@ -70,6 +70,11 @@ class Mesh(Checked):
     stiffness_slopes: bool = quantity(None, False)
     contact: bool = quantity(None, True)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.alike and self.element != "hexahedra":
+            raise InputError(f"alike = true: {self.element} differ from design to design: take hexahedra")
+
     @property
     def settings(self) -> dict[str, Any]:
         """What makes the mesh, in file units."""
