@@ -15,7 +15,7 @@ def register(measured: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     What points on a line leave open is the turn about that line: there it is the smallest one.
     """
     a, b = measured.mean(axis=0), wanted.mean(axis=0)
-    u, size, vt = np.linalg.svd((measured - a).T @ (wanted - b))
+    u, _, vt = np.linalg.svd((measured - a).T @ (wanted - b))
     if line_of(wanted) is not None:
         return _shortest(measured - a, wanted - b, a, b)
     sign = np.sign(np.linalg.det(u @ vt))
@@ -45,7 +45,7 @@ def turned_about(line: tuple[np.ndarray, np.ndarray], moving: np.ndarray, wanted
 
 def _shortest(p, q, a, b):
     """The smallest turn that takes the line of p to that of q."""
-    (_, along), (_, wanted) = _main(p), _main(q)
+    along, wanted = (np.linalg.svd(points, full_matrices=False)[2][0] for points in (p, q))
     if np.sum(p @ along * (q @ wanted)) < 0:
         along = -along
     cross = np.cross(along, wanted)
@@ -54,8 +54,3 @@ def _shortest(p, q, a, b):
     turn = cross / np.linalg.norm(cross) * np.arctan2(np.linalg.norm(np.cross(along, wanted)), along @ wanted)
     R = se3.exp_rotation(turn)
     return se3.make_pose(R, b - R @ a)
-
-
-def _main(points):
-    _, size, vt = np.linalg.svd(points, full_matrices=False)
-    return size, vt[0]

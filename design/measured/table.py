@@ -70,7 +70,8 @@ def read_measured(path: str | Path) -> Measurement:
     if list(points) == [""] and np.unique(pressures, return_counts=True)[1].max() > 1:
         return _centrelines(table, pressures, _point(table, "", points[""]))
     if points:
-        points = {name or TIP: columns for name, columns in points.items()}
+        usual = {"": TIP, **{name: name.lower() for name in points if name.lower() in (TIP, BASE)}}
+        points = {usual.get(name, name): columns for name, columns in points.items()}
         rows = np.stack([_point(table, name, columns) for name, columns in points.items()], axis=1)
         return _levels(table, MARKERS, pressures, rows, tuple(points))
     for what in (ANGLE, DISPLACEMENT):

@@ -101,9 +101,9 @@ def _limit_point(design, law, solved):
         return f"the law vouches no further: {told[0]}" if told else None
 
     low, high = 0.0, FARTHEST * design.largest_pressure
-    if not high or not objection(high):
+    reason = objection(high) if high else None
+    if not reason:
         return
-    reason = objection(high)
     while high - low > 0.01 * design.largest_pressure:
         middle = (low + high) / 2
         told = objection(middle)

@@ -203,6 +203,12 @@ def test_names_of_markers_in_a_row_above_are_numbered(tmp_path):
     assert found.values[1, 1] == pytest.approx([40, 0, 20])
 
 
+def test_the_tip_is_the_tip_in_capitals_too(tmp_path):
+    columns = [f"{name}_{axis}_mm" for name in ("Left", "Tip") for axis in "xyz"]
+    write_csv(tmp_path / "m.csv", ["p_kPa", *columns], [[0, *range(6)], [10, *range(6)]])
+    assert read_measured(tmp_path / "m.csv").names == ("Left", "tip")
+
+
 def test_finite_elements_of_the_folder_stand_beside_it(tmp_path):
     """Those of the made-up run are the model with every strain times a factor: measured is half of that."""
     make_run(tmp_path / "run", segments=(PLANE,), fields=False)
