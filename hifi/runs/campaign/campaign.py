@@ -15,9 +15,8 @@ from pneunet.base.files.atomic import room_in, write_text
 from pneunet.base.files.dataset import DIRECTIONS, UPPER, CellData, columns, write_dataset
 from pneunet.base.files.datasheet import datasheet
 from pneunet.base.files.record import revision, write_record
-from pneunet.base.materials.laws import Yeoh
 from pneunet.base.system.interrupts import Interrupted
-from pneunet.geometry.shape_numbers import SHAPE, STIFFENING, direction_matrix, normal_pitch, shape_numbers
+from pneunet.geometry.shape_numbers import SHAPE, STIFFENING, direction_matrix, normal_pitch, numbers_of
 from pneunet.hifi.fem.agreement import folder_of_all, on_rank_0
 from pneunet.hifi.runs.campaign.case import STATES
 from pneunet.hifi.runs.campaign.extension import Known, taken_over
@@ -154,6 +153,7 @@ class Gathering:
 def _case_row(campaign, design, record):
     result = record["result"] or {}
     mesh = result.get("mesh", {})
+    (numbers,), (pitch,) = numbers_of([design.segment])
     over_mu = {
         name: result[name] / MU if result.get(name) is not None else np.nan
         for name in ("limit_pressure", "first_touch")
@@ -163,9 +163,9 @@ def _case_row(campaign, design, record):
         "design": design.index,
         "held_out": design.held_out,
         "mesh": campaign.meshes.index(design.mesh),
-        "shape": shape_numbers(design.segment),
-        "stiffening": stiffening(design.segment.material),
-        "normal_pitch_mm": normal_pitch(design.segment),
+        "shape": numbers[: len(SHAPE)],
+        "stiffening": numbers[len(SHAPE) :],
+        "normal_pitch_mm": pitch,
         "status": STATUSES.index(record["status"]),
         **over_mu,
         "cells": mesh.get("cells", 0),
@@ -173,11 +173,6 @@ def _case_row(campaign, design, record):
         "seconds": result.get("cpu_seconds", record["seconds"]),
         "missing": len(result.get("missing", [])),
     }
-
-
-def stiffening(material: Yeoh) -> tuple[float, float]:
-    """STIFFENING of a sample's material."""
-    return material.c20 / material.c10, material.c30 / material.c10
 
 
 def _state_row(segment, state):
