@@ -146,6 +146,11 @@ def test_what_is_wrong_in_a_file_is_named_with_its_member(tmp_path, data):
         ({"about": np.frombuffer(b"[1]", np.uint8)}, "member 'about': is no table of keys"),
         ({"about": about(kinds="twisting")}, "member 'about' has no list 'kinds'"),
         ({"about": about(meshes=[5])}, "member 'about': '5' is not understood"),
+        (
+            {"about": about(meshes=[{"name": "a", "mesh_size_mm": "b"}])},
+            "member 'about': .*is not understood",
+        ),
+        ({"about": about(statuses=["crashed", "x"])}, "member 'about': 'statuses' is not understood"),
     ):
         np.savez(path, **{name: value for name, value in (arrays | changed).items() if value is not None})
         with pytest.raises(InputError, match=f"cells.npz: {told}.*: make it again with pneunet campaign$"):
