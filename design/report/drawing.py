@@ -8,7 +8,7 @@ import numpy as np
 
 from pneunet.base.files.atomic import atomic_path
 from pneunet.design.report.dimensions import INK, SheetView
-from pneunet.design.report.labels import REDUCED, kPa, plain, segment_colour, segment_mode
+from pneunet.design.report.labels import REDUCED, kPa, material_names, plain, segment_colour, segment_mode
 from pneunet.design.report.section_views import cross_section, normal_section, section_groups, section_scale
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
@@ -31,13 +31,14 @@ def segment_table(manipulator: Manipulator) -> list[tuple[str, list[str]]]:
     def row(label, value, passive=False):
         return label, [value(s) if s.chambers or passive else "-" for s in manipulator.segments]
 
+    called = material_names(manipulator)
     layers = [
         row(
             "stiff layer, bottom of the base",
             lambda s: plain(s.layer_thickness) if s.layer_thickness else "-",
             True,
         ),
-        row("its material", lambda s: s.layer_material.name if s.layer_thickness else "-", True),
+        row("its material", lambda s: called[s.layer_material] if s.layer_thickness else "-", True),
     ]
     fillets = [row("fillet of chambers' edges", lambda s: plain(s.fillet) if s.fillet else "-")]
     rolls = [row("roll about the axis, deg", lambda s: f"{s.roll}", True)]
@@ -68,7 +69,7 @@ def segment_table(manipulator: Manipulator) -> list[tuple[str, list[str]]]:
         row("passive length, each end", lambda s: plain(s.end_length)),
         row("active length", lambda s: plain(s.active_length)),
         row("length", lambda s: plain(s.length), True),
-        row("material", lambda s: s.material.name, True),
+        row("material", lambda s: called[s.material], True),
         row("shear modulus, MPa", lambda s: plain(s.material.mu, 4), True),
         *(layers if any(s.layer_thickness for s in manipulator.segments) else []),
         *(fillets if any(s.fillet for s in manipulator.segments) else []),
@@ -156,9 +157,9 @@ def _frame(figure, design, height):
     )
     figure.text(x, y - 0.33 / height, facts, fontsize=10, color=INK, va="top")
     figure.text(1 - x, y, "all dimensions in mm", fontsize=10, color=INK, va="top", ha="right")
-    materials = {m.name: m for m in manipulator.materials}.values()
     told = "; ".join(
-        f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$" for m in materials
+        f"{m.name}: {m.law}, mu = {plain(m.mu, 4)} MPa, {plain(m.density * 1e12)} kg/m$^3$"
+        for m in manipulator.materials
     )
     notes = (
         f'Material {told}.\n"Normal" = measured across the chamber. z = 0 is the channel axis (blue). The'

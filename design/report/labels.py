@@ -1,9 +1,11 @@
 """Colours, names and number formats shared by every picture: the same thing looks the same everywhere."""
 
 import math
+from collections import Counter
 
+from pneunet.base.materials.laws import Hyperelastic
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.geometry.parameters import PASSIVE, TWISTING, Segment
+from pneunet.geometry.parameters import PASSIVE, TWISTING, Manipulator, Segment
 
 TARGET, REDUCED, FINITE_ELEMENTS = "#30363d", "#1f6fb2", "#d9480f"
 STYLES: dict[str, dict] = {
@@ -49,6 +51,16 @@ def significant(value: float, digits: int = 4) -> str:
 def signed(value: float, digits: int = 4) -> str:
     """`significant` with a plus before what is positive."""
     return "+" * (value > 0) + significant(value, digits)
+
+
+def material_names(manipulator: Manipulator) -> dict[Hyperelastic, str]:
+    """{material of a body: what it is called}: its name, which is the same for all that were given none; then
+    with the shear modulus, which tells them apart."""
+    shared = Counter(m.name for m in manipulator.materials)
+    return {
+        m: f"{m.name}, mu = {significant(m.mu)} MPa" if shared[m.name] > 1 else m.name
+        for m in manipulator.materials
+    }
 
 
 def segment_mode(segment: Segment) -> str:

@@ -25,7 +25,7 @@ from pneunet.design.report.comparison import (
     verdict,
 )
 from pneunet.design.report.drawing import draw_drawing, segment_table
-from pneunet.design.report.labels import kPa, plain, segment_name, signed, significant
+from pneunet.design.report.labels import kPa, material_names, plain, segment_name, signed, significant
 from pneunet.design.report.page import STYLE, folded, grid, image, missing, table
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.report.viewing import framed
@@ -271,10 +271,10 @@ def _drawing(run, folder):
         ["segment", *[str(i + 1) for i in range(len(rows[0][1]))]],
         [[label, *values] for label, values in rows],
     )
-    materials = {m.name: m for m in run.design.manipulator.materials}.values()
+    called = material_names(run.design.manipulator).items()
     told = table(
         ["material", "law", "shear modulus, MPa", "density, kg/m³", "source"],
-        [[m.name, m.law, plain(m.mu, 4), plain(m.density * 1e12), m.source or "-"] for m in materials],
+        [[name, m.law, plain(m.mu, 4), plain(m.density * 1e12), m.source or "-"] for m, name in called],
     )
     return image(folder, "drawing.png", "All dimensions in mm.") + dimensions + told
 

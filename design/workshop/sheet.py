@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from pneunet.base.materials.laws import PAPER_TWISTING
 from pneunet.base.units import KPA_PER_MPA
-from pneunet.design.report.labels import kPa, plain, segment_name
+from pneunet.design.report.labels import kPa, material_names, plain, segment_name
 from pneunet.design.search.tolerances import Effect
 from pneunet.design.workshop.limits import Limit
 from pneunet.geometry.designfile import DesignFile
@@ -88,17 +88,16 @@ def _print(pack):
 
 def amounts(pack: Pack) -> list[tuple[str, str, float, float, int]]:
     """(layer, silicone, mL, g, casts) of every pour, what is wasted included."""
-    density = {m.name: m.density for m in pack.design.manipulator.materials}
-    out = []
+    names, out = material_names(pack.design.manipulator), []
     for number, run in enumerate(pack.runs, start=1):
         for layer in run.layers:
             if layer.name == LOWER and run.same_turned:
                 continue
             casts = 2 if layer.name == UPPER and run.same_turned else 1
-            for name, volume in layer.volumes.items():
+            for silicone, volume in layer.volumes.items():
                 mm3 = volume * (1 + pack.moulds.waste)
-                of = called(layer, number, len(pack.runs))
-                out.append((of, name, mm3 * ML_PER_MM3, mm3 * density[name] * GRAM_PER_TONNE, casts))
+                of, gram = called(layer, number, len(pack.runs)), mm3 * silicone.density * GRAM_PER_TONNE
+                out.append((of, names[silicone], mm3 * ML_PER_MM3, gram, casts))
     return out
 
 
@@ -209,7 +208,8 @@ def _inflate(pack):
 
 
 def _unknown(pack):
-    unknown = [m.name for m in pack.design.manipulator.materials if m.elongation_at_break == float("inf")]
+    names = material_names(pack.design.manipulator)
+    unknown = [name for m, name in names.items() if m.elongation_at_break == float("inf")]
     return f"At what stretch the silicone tears is not known: {'; '.join(unknown)}." if unknown else ""
 
 

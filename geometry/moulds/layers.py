@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from pneunet.base.errors import InputError
+from pneunet.base.materials.laws import Hyperelastic
 from pneunet.geometry.ends import Bar, placed
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import PASSIVE, TWISTING, Manipulator, Segment
@@ -154,9 +155,9 @@ class Layer:
     z1: float
 
     @property
-    def volumes(self) -> dict[str, float]:
-        """{name of the silicone: mm3}, no waste."""
-        out: dict[str, float] = {}
+    def volumes(self) -> dict[Hyperelastic, float]:
+        """{silicone: mm3}, no waste."""
+        out: dict[Hyperelastic, float] = {}
         for part in self.run.parts:
             s = part.segment
             whole = body_volume(part, self.z0, self.z1)
@@ -164,9 +165,9 @@ class Layer:
             if part.layer:
                 stiff = part.layer.volume(self.z0, self.z1)
                 assert s.layer_material is not None
-                out[s.layer_material.name] = out.get(s.layer_material.name, 0.0) + stiff
-            out[s.material.name] = out.get(s.material.name, 0.0) + whole - stiff
-        return {name: volume for name, volume in out.items() if volume > 1e-9}
+                out[s.layer_material] = out.get(s.layer_material, 0.0) + stiff
+            out[s.material] = out.get(s.material, 0.0) + whole - stiff
+        return {silicone: volume for silicone, volume in out.items() if volume > 1e-9}
 
 
 def cut(start: float, stop: float, longest: float, places: np.ndarray) -> list[float]:

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 import pneunet as pn
-from pneunet.base.materials.laws import PAPER_TWISTING
+from pneunet.base.materials.laws import PAPER_TWISTING, NeoHookean
 from pneunet.cli import main
 from pneunet.design.workshop.limits import limits
 from pneunet.design.workshop.sensitivity import sensitive
-from pneunet.design.workshop.sheet import Pack, sections
+from pneunet.design.workshop.sheet import Pack, amounts, sections
 from pneunet.geometry.cad import body as cad
 from pneunet.geometry.designfile import DesignFile, write_design_file
+from pneunet.geometry.moulds.layers import runs
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.reduced.rod.clearance import gap_left, wall_bulge, wall_stretch
@@ -85,6 +86,17 @@ def test_what_matters_most_comes_first():
     effects = sensitive(DesignFile(TWO, (0.004, 0.002)), ToyLaw())
     sizes = [e.rms for e in effects]
     assert 3 <= len(effects) <= 8 and sizes == sorted(sizes, reverse=True) and sizes[0] > 0
+
+
+def test_silicones_without_names_are_mixed_apart():
+    soft, stiff = NeoHookean(mu=0.1), NeoHookean(mu=1.0, density=2e-9)
+    layered = replace(FINGER, material=soft, layer_thickness=0.5, layer_material=stiff)
+    body, moulds = Manipulator((layered,)), Moulds(shrinkage=0.0, waste=0.0)
+    pours = amounts(Pack(DesignFile(body, 0.02), moulds, (), runs(body), (), ()))
+    grams = {name: sum(gram for _, of, _, gram, _ in pours if of == name) for _, name, *_ in pours}
+    assert list(grams) == ["silicone, mu = 0.1 MPa", "silicone, mu = 1 MPa"]
+    layer = layered.length * layered.width * 0.5 * stiff.density * 1e6
+    assert grams["silicone, mu = 1 MPa"] == pytest.approx(layer)
 
 
 def test_the_sheet_says_which_silicone_was_assumed():
