@@ -3,6 +3,7 @@ rest."""
 
 import numpy as np
 
+from pneunet.base.errors import InputError
 from pneunet.geometry import tags
 from pneunet.geometry.ends import lean
 from pneunet.geometry.fillets import NO_CELL, refuse_fillets
@@ -30,7 +31,8 @@ def cell_grid(
     layer (mm): one element of this thickness on each side of every plane in which stresses are singular.
     gaps: the room between the chambers is meshed too. part: only xi >= 0, and of a twisting cell only y >= 0:
     HALF_TURNS make the rest. like: a segment whose elements the grid has, as many between any two planes,
-    whatever size they come to here: a response on such grids is smooth in the design.
+    whatever size they come to here: a response on such grids is smooth in the design. InputError where the
+    planes of the two stand in another order.
     """
     refuse_fillets([segment], NO_CELL)
     s = snapped(segment)
@@ -41,6 +43,12 @@ def cell_grid(
     if like:
         to = Morph(like, s)
         xi, y, z = (_apart(a) for a in (to.along(xi), to.sideways(y), to.upright(z)))
+        own = along(s), sideways(s), upright(s, np.inf)
+        if not all(_has(places, planes) for places, planes in zip((xi, y, z), own)):
+            raise InputError(
+                "a grid like another cell's has planes in the order of those, which this cell's are not in:"
+                " leave out alike"
+            )
     if not part:
         xi = np.concatenate([-xi[:0:-1], xi])
     if part and twisting:
@@ -57,6 +65,11 @@ def cell_grid(
 def _apart(places):
     """Those that differ: planes of another cell may be one here."""
     return places[np.append(True, np.diff(places) > SAME)]
+
+
+def _has(places, planes):
+    """Whether the planes are among rising places."""
+    return np.abs(np.subtract.outer(planes.places, places)).min(axis=1).max() < 1e-6
 
 
 def sheared(segment: Segment, xi: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import NeoHookean
 from pneunet.geometry import tags
 from pneunet.geometry.grids.body import body_grid
@@ -76,6 +77,21 @@ def test_planes_that_are_one_here_and_two_there_leave_no_flat_elements():
     mesh = cell_grid(flush, 2.0, part=True, like=like).mesh(air=True)
     assert mesh.volumes().min() > 1e-3
     assert 4 * mesh.volumes().sum() == pytest.approx(sum(cell_volumes(flush)), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"roof": 3.5, "chamber_height": 3.0, "top_wall": 2.0},
+        {"cavity_floor": 0.5},
+        {"layer_thickness": 0.5, "layer_material": NeoHookean(mu=1.0)},
+    ],
+    ids=["ceiling within the core", "floor in the channel", "layer"],
+)
+def test_a_grid_like_another_segment_s_is_refused_where_it_would_miss_a_plane(change):
+    like = CASES["one_sided_w10"](45.0, 1)
+    with pytest.raises(InputError, match="leave out alike"):
+        cell_grid(replace(like, **change), 2.0, like=like)
 
 
 def matched(points, others):
