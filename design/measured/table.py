@@ -78,7 +78,7 @@ def read_measured(path: str | Path) -> Measurement:
         if what in scalars:
             column, factor = scalars[what]
             rows = factor * table.numbers(column, gaps=True)[:, None, None]
-            if what == ANGLE and not np.nanmax(np.abs(rows)) <= 180:
+            if what == ANGLE and np.nanmax(np.abs(rows), initial=0.0) > 180:
                 raise InputError(f"{path}: an angle over 180 deg is not told from 360 less it: give points")
             return _levels(table, what, pressures, rows)
     raise InputError(

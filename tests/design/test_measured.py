@@ -233,6 +233,7 @@ BAD = {
     "pressure_kPa,mass\n0,0\n1,2\n": "nothing to compare",
     "pressure_kPa,angle_deg\n0,0\n10,200\n": "over 180",
     "pressure_kPa,angle_deg\n10,1\n10,2\n": "one pressure only",
+    "pressure_kPa,angle_deg\n0,\n10,\n": "holds one pressure only",
     "pressure_kPa,angle_deg\n-20,1\n10,2\n": "gauge pressures",
     "pressure_kPa,angle_deg\n5,1\n10,2\n": "at rest",
     "pressure_kPa,displacement_psi\n0,1\n10,2\n": "no unit of length",
