@@ -14,6 +14,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import Yeoh
 from pneunet.geometry import tags
 from pneunet.geometry.grids.morph import Morph
@@ -24,14 +25,22 @@ from pneunet.hifi.cell.system import CellSystem
 #: normal pitches or, for the angle, degrees; and of c10. Walls begin to push over micrometres: at a hundred
 #: times these steps slopes in contact are off by a tenth
 STEP, ANGLE_STEP, MATERIAL_STEP = 1e-6, 1e-4, 1e-5
+#: mm; places that are one
+SAME = 1e-8
 
 
 class StateSlopes:
-    """For a hifi.cell.problem.CellProblem, which must be where its segment is. Derivatives by the stiffening
-    are for Yeoh's law, zero for others."""
+    """For a hifi.cell.problem.CellProblem, which must be where its segment is: InputError where the mesh ends
+    elsewhere, since planes were made one (geometry.snapping). Derivatives by the stiffening are for Yeoh's
+    law, zero for others."""
 
     def __init__(self, problem: CellProblem):
         self.problem, home, vertices = problem, problem.segment, problem.mesh.geometry.x.copy()
+        if not np.abs(Morph(home, home)(vertices) - vertices).max() < SAME:
+            raise InputError(
+                "slopes: a ceiling next to the core's top, which the grid has made one plane: no derivative"
+                " is known there"
+            )
         self._home = problem.placement
         self._moved, self.steps = [], []
         for name, change in DIRECTIONS[home.kind].items():

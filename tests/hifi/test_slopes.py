@@ -1,14 +1,19 @@
 """Derivatives of free states by the shape, against states of cells whose mesh was moved and solved again; and
 by how the material stiffens, against those of cells of stiffer materials."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import NeoHookean, Yeoh, unchecked
 from pneunet.geometry.cad.cell import mesh_cell
 from pneunet.geometry.cad.grid import grid_cell
+from pneunet.geometry.grids.cell import cell_grid
 from pneunet.geometry.grids.morph import Morph
+from pneunet.geometry.parameters import Segment
 from pneunet.geometry.reference_cases import CASES
 from pneunet.geometry.shape_numbers import DIRECTIONS, changed
 from pneunet.hifi.cell.problem import CellProblem
@@ -63,6 +68,15 @@ def test_they_are_differences_of_states_on_the_moved_mesh(name, pressure, tmp_pa
         for slope, plus, minus in zip((strains[row], stiffness[row]), *ends):
             difference = (plus - minus) / (2 * step)
             assert slope == pytest.approx(difference, rel=0.02, abs=0.02 * np.abs(difference).max())
+
+
+def test_a_cell_whose_grid_ends_elsewhere_has_none():
+    """Its ceiling, 0.05 mm below the core's top, was lifted there, and its top with it."""
+    segment = Segment("one-sided", 60.0, 1, cavity_floor=0.0, chamber_height=1.95)
+    points = cell_grid(segment, 4.0).mesh(air=True).points
+    mesh = SimpleNamespace(geometry=SimpleNamespace(x=points))
+    with pytest.raises(InputError, match="no derivative is known there"):
+        StateSlopes(SimpleNamespace(segment=segment, mesh=mesh))
 
 
 def test_those_by_the_stiffening_are_differences_of_states_of_other_materials(tmp_path):
