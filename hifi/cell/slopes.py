@@ -56,11 +56,11 @@ class StateSlopes:
         free state of `system`, a CellSystem that has just been factorised there. mm, N, and normal pitches,
         degrees or parts of c10."""
         problem, state = self.problem, system.state.copy()
-        inner, slope = self._residual(state)
+        inner, slope = system.derivatives()
         rates = []
         for number, step in enumerate(self.steps):
             with self._changed(number):
-                there = self._residual(state)
+                there = system.derivatives()
             rates.append(np.concatenate([there[0] - inner, there[1] - slope]) / step)
         rates = np.array(rates).T
         inner, slope = rates[:-6], rates[-6:]
@@ -102,16 +102,6 @@ class StateSlopes:
             yield
         finally:
             constant.value = kept
-
-    def _residual(self, state):
-        """(of unknowns and multipliers, of the strains) at the problem's state, `state` (unknowns + 12,)."""
-        problem, n = self.problem, self.problem.unknowns
-        forces, slope = problem.residual()
-        u, multipliers, q = state[:n], state[n:-6], state[-6:]
-        inner = np.concatenate(
-            [forces + problem.gauge @ multipliers, problem.gauge.T @ u + problem.gauge_strains @ q]
-        )
-        return inner, slope + problem.gauge_strains.T @ multipliers
 
     def _second_derivatives(self, influences):
         """(6, 6) sum of Z^T H Z over the classes of symmetry, Z = (-influence, 1) of each."""

@@ -137,8 +137,8 @@ class CellSystem:
         return state
 
     # ---- residual and tangent
-    def _parts(self):
-        """(residual of the unknowns and the gauge, residual of all six strains) at the current state."""
+    def derivatives(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the potential at the current state: by unknowns and multipliers (n,), by all six strains (6,)."""
         n = self.problem.unknowns
         forces, slope = self.problem.residual()
         gauge, gauge_strains = self.problem.gauge, self.problem.gauge_strains
@@ -147,7 +147,7 @@ class CellSystem:
         return r, slope + gauge_strains.T @ multipliers
 
     def residual(self) -> tuple[np.ndarray, float]:
-        r, slope = self._parts()
+        r, slope = self.derivatives()
         return np.concatenate(
             [r, slope[self._free] / self.pitch]
         ), self.problem.segment.material.mu * self.pitch**2
@@ -253,7 +253,7 @@ class CellSystem:
             _, part, more = self.of_class(number)
             stiffness += part
             unstable += more
-        _, slope = self._parts()
+        _, slope = self.derivatives()
         q = self._x[-6:]
         return CellState(
             float(self.problem.pressure.value),
