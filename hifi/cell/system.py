@@ -138,7 +138,7 @@ class CellSystem:
 
     # ---- residual and tangent
     def derivatives(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the potential at the current state: by unknowns and multipliers (n,), by all six strains (6,)."""
+        """Of the potential at the current state: by unknowns and multipliers (n,), by the strains (6,)."""
         n = self.problem.unknowns
         forces, slope = self.problem.residual()
         gauge, gauge_strains = self.problem.gauge, self.problem.gauge_strains
