@@ -167,7 +167,7 @@ def test_a_path_that_reaches_nothing_is_no_case_with_a_limit_load_of_0(apart, wh
     monkeypatch.setattr(case, "EquilibriumPath", lambda *arguments: rest)
     monkeypatch.setattr(case, "run_steps", nowhere)
     sampler = case.Sampler.__new__(case.Sampler)
-    sampler.apart, sampler.options, sampler.largest_step = apart, NewtonOptions(), 0.5
+    sampler.apart, sampler.options, sampler.steps = apart, NewtonOptions(), case.STEPS
     walls = SimpleNamespace(distance=lambda: 0.0)
     sampler.system = SimpleNamespace(volume=lambda: 1.0, walls=walls)
     sampler.problem = SimpleNamespace(segment=CASES["one_sided_w10"](60.0, 1))

@@ -154,8 +154,6 @@ class Sampler:
                 raise
             # what the path has reached is used; that it ended is told below
             limit = max(a.load for a in self.walked)
-            if limit <= 0:
-                raise
         if path.limit_points:
             limit = path.limit_points[0].load
         highest = max(a.load for a in self.walked)
