@@ -17,6 +17,10 @@ from pneunet.geometry.snapping import snapped
 HALF_TURNS = {ONE_SIDED: ((-1, -1, 1),), TWISTING: ((-1, -1, 1), (1, -1, -1), (-1, 1, -1))}
 
 
+#: mm; a plane further from all places is missed. Morph's interpolation moves them by rounding alone
+MISSED = 1e-6
+
+
 def cell_grid(
     segment: Segment,
     size: float,
@@ -68,8 +72,8 @@ def _apart(places):
 
 
 def _has(places, planes):
-    """Whether the planes are among rising places."""
-    return np.abs(np.subtract.outer(planes.places, places)).min(axis=1).max() < 1e-6
+    """Whether the planes are among places (n,), mm."""
+    return np.abs(np.subtract.outer(planes.places, places)).min(axis=1).max() < MISSED
 
 
 def sheared(segment: Segment, xi: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:

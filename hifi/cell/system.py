@@ -138,7 +138,8 @@ class CellSystem:
 
     # ---- residual and tangent
     def derivatives(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the potential at the current state: by unknowns and multipliers (n,), by the strains (6,)."""
+        """Of a pitch's potential at the current state: by unknowns and multipliers (n,), in N and, by the
+        pressure field, mm3; by all six strains (6,), in N mm for e and N mm2 for k."""
         n = self.problem.unknowns
         forces, slope = self.problem.residual()
         gauge, gauge_strains = self.problem.gauge, self.problem.gauge_strains
