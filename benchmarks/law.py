@@ -10,10 +10,6 @@ from benchmarks.tables import below_mark, table
 
 PRESSURE = 0.02  # MPa
 BATCH = 10_000
-#: more slanted designs, which the law has not learned from: examples/campaigns/cells-slanted-v1.toml; bands
-#: of angles, degrees
-SLANTED, BANDS = "cells-slanted-v1.npz", ((35, 40), (30, 35))
-FREE = ("law_strain_median_rel", "law_strain_p95_rel", "law_tip100_p95_rel", "law_stiffness_p95_rel")
 JUDGED = (
     *("law_strain_median_rel", "law_strain_p95_rel", "law_angles_30_40_p95_rel", "law_tip100_p95_rel"),
     *("law_stiffness_p95_rel", "law_force_p95_rel", "law_mesh_uncertainty_rel"),
@@ -62,29 +58,7 @@ def law():
     ):
         figures[f"dataset_{kind.replace('-', '_')}"] = int(number)
     figures["dataset_accepted_fraction"] = float(data.accepted.mean())
-    beyond = slanted(shipped, read_dataset(DATA_SET.with_name(SLANTED)))
-    for kind, rows in beyond.items():
-        details[kind]["beyond the angles"] = rows
-    worst = np.max([row[2:] for rows in beyond.values() for row in rows], axis=0)
-    figures |= {key.replace("law_", "slanted_"): float(value) for key, value in zip(FREE, worst)}
     return {key: value for key, value in figures.items() if np.isfinite(value)} | costs(shipped), details
-
-
-def slanted(shipped, data):
-    """{kind: [(angles, number of designs, *figures FREE)]} of a TrainedLaw on a data set's designs in BANDS
-    of angles."""
-    from pneunet.reduced.training.judging import figures, misses
-    from pneunet.reduced.training.states import sample_of
-
-    out = {}
-    for kind, law in shipped.kinds.items():
-        sample, out[kind] = sample_of(data, kind, False), []
-        for low, high in BANDS:
-            angle = sample.free.numbers[:, 0]
-            band = sample.of(sample.free.design[(angle >= low) & (angle < high)])
-            found = figures([misses(law, band)])
-            out[kind].append((f"{low} to {high} deg", len(band.designs), *[found[key] for key in FREE]))
-    return out
 
 
 def _coarse(data):
@@ -156,17 +130,4 @@ def page(text, details, meta):
         ]
         rows = [(n, f"{median:.2%}", f"{high:.2%}") for n, median, high in found["learning curve"]]
         lines += ["", *table(["designs trained on", "median error", "95th percentile"], rows)]
-        rows = [
-            (angles, n, *[f"{value:.1%}" for value in values])
-            for angles, n, *values in found["beyond the angles"]
-        ]
-        head = [
-            "angles that it has not learned from",
-            "designs",
-            "median error",
-            "95th percentile",
-            "of tips",
-            "of stiffness",
-        ]
-        lines += ["", *table(head, rows)]
     return below_mark(text, "law", lines)

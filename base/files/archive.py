@@ -82,7 +82,7 @@ def write_archive(
 
 def read_archive(
     path: str | Path,
-    schema: str | Collection[str],
+    schema: str,
     what: str,
     fix: str,
     keys: Mapping[str, type],
@@ -92,8 +92,8 @@ def read_archive(
     """(about, {name: array}) of the members that members(about, names in the file) declares.
 
     keys: what `about` must hold, and of which types; a dict that is missing is empty. InputError when the
-    file is no `what` of this schema, or of one of several, the newest first, as `fix` makes it, or when
-    something in it is missing, damaged, of another form or more than `largest` bytes.
+    file is no `what` of this schema, as `fix` makes it, or when something in it is missing, damaged, of
+    another form or more than `largest` bytes.
     """
     sizes: dict[str, int] = {}
     arrays = {}
@@ -119,9 +119,8 @@ def read_archive(
 
         table = read("about", Member("u", ("characters of about",)))
         about = _about(table, f"{path}: member 'about'", fix)
-        schemas = [schema] if isinstance(schema, str) else list(schema)
-        if about.get("schema") not in schemas:
-            raise InputError(f"{path}: schema '{about.get('schema')}' is not '{schemas[0]}': {fix}")
+        if about.get("schema") != schema:
+            raise InputError(f"{path}: schema '{about.get('schema')}' is not '{schema}': {fix}")
         for key, kind in keys.items():
             value = about.setdefault(key, {}) if kind is dict else about.get(key)
             if not isinstance(value, kind):

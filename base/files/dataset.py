@@ -22,9 +22,6 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.archive import Member, read_archive, write_archive
 
 SCHEMA = "pneunet-cells-3"
-#: the schema before: of neo-Hookean cells, with fewer directions, and the largest stretch at a point
-NEO_HOOKEAN, NEO_HOOKEAN_DIRECTIONS = "pneunet-cells-2", 10
-STIFFENING = ["c20/c10", "c30/c10"]
 FIX = "make it again with pneunet campaign"
 #: keys of `about` that are read again, and their types
 KEYS = {
@@ -206,45 +203,19 @@ def _rounded(values, bits):
 
 
 def read_dataset(path: str | Path) -> CellData:
-    """The CellData in a file, one of the schema before included; InputError when it is none or of another
-    version."""
-    schemas = SCHEMA, NEO_HOOKEAN
-    about, arrays = read_archive(path, schemas, "a data set of cells", FIX, KEYS, _members)
-    if about["schema"] == NEO_HOOKEAN:
-        about, arrays = _with_stiffening(about, arrays)
+    """The CellData in a file; InputError when it is none or of another version."""
+    about, arrays = read_archive(path, SCHEMA, "a data set of cells", FIX, KEYS, _members)
     return CellData(about, **arrays)
-
-
-def _with_stiffening(about, arrays):
-    """What a data set of neo-Hookean cells is in this schema: they do not stiffen. Derivatives by that are
-    not known, nor is the largest stretch, of which the file has another measure."""
-    directions = {
-        kind: np.pad(np.array(rows, float), ((0, 0), (0, len(STIFFENING)))).tolist()
-        for kind, rows in about["directions"].items()
-    }
-    more = {"stiffening": np.zeros((len(arrays["kind"]), len(STIFFENING)), "f4")}
-    more["largest_stretch"] = np.full_like(arrays["largest_stretch"], np.nan)
-    for name in ("strain_slopes", "stiffness_slopes"):
-        missing = DIRECTIONS - NEO_HOOKEAN_DIRECTIONS
-        more[name] = np.pad(arrays[name], ((0, 0), (0, missing), (0, 0)), constant_values=np.nan)
-    return about | {"schema": SCHEMA, "stiffening": STIFFENING, "directions": directions}, arrays | more
 
 
 def _members(about, _):
     """What the file holds: every column of CellData."""
-    before = about["schema"] == NEO_HOOKEAN
-    if before:
-        about["stiffening"] = []
     _require_lists(about)
     members = {}
     for f in columns():
         kind = {"i": "iu", "f": "f", "?": "b"}[f.metadata["type"][0]]
         of, index_of = f.metadata["of"], f.metadata["index_of"]
         form, gaps = (of, *f.metadata["shape"]), f.metadata["gaps"]
-        if before and f.name == "stiffening":
-            continue
-        if before and f.name.endswith("_slopes"):
-            form = of, NEO_HOOKEAN_DIRECTIONS, form[2]
         members[f.name] = Member(kind, form, gaps=gaps)
         if index_of:
             below = len(about[index_of]) if index_of in about else index_of

@@ -5,12 +5,8 @@ import numpy as np
 import pytest
 
 from pneunet.base.errors import InputError
-from pneunet.base.files.archive import write_archive
 from pneunet.base.files.dataset import (
-    NEO_HOOKEAN,
-    NEO_HOOKEAN_DIRECTIONS,
     SCHEMA,
-    STIFFENING,
     UPPER,
     CellData,
     columns,
@@ -29,7 +25,7 @@ def data():
         "kinds": ["one-sided", "twisting"],
         "meshes": [{"name": "coarse", "mesh_size_mm": 2.0, "element": "hexahedra"}],
         "shape": [f"s{i}" for i in range(13)],
-        "stiffening": STIFFENING,
+        "stiffening": ["c20/c10", "c30/c10"],
         "statuses": ["done", "crashed"],
         "directions": {},
         "reasons": {"2": "ended by signal SIGSEGV"},
@@ -73,22 +69,6 @@ def test_a_file_gives_back_what_was_written(tmp_path, data):
             assert (getattr(again, f.name) == getattr(data, f.name)).all()
     assert again.about == {"schema": SCHEMA, **data.about}
     assert again.matrices == pytest.approx(matrix + matrix.transpose(0, 2, 1), rel=1e-6)
-
-
-def test_cells_of_the_schema_before_do_not_stiffen(tmp_path, data):
-    known = NEO_HOOKEAN_DIRECTIONS
-    arrays = {f.name: getattr(data, f.name) for f in columns() if f.name != "stiffening"}
-    arrays |= {name: arrays[name][:, :known] for name in ("strain_slopes", "stiffness_slopes")}
-    about = {key: value for key, value in data.about.items() if key != "stiffening"}
-    about["directions"] = {"one-sided": [[1.0] * 13]}
-    write_archive(tmp_path / "old.npz", NEO_HOOKEAN, about, arrays)
-    again = read_dataset(tmp_path / "old.npz")
-    assert not again.stiffening.any() and np.isnan(again.largest_stretch).all()
-    assert again.about["directions"] == {"one-sided": [[1.0] * 13 + [0.0] * 2]}
-    assert np.isnan(again.strain_slopes[:, known:]).all()
-    assert (again.stiffness_slopes[:, :known] == data.stiffness_slopes[:, :known]).all()
-    write_dataset(tmp_path / "new.npz", again)
-    assert read_dataset(tmp_path / "new.npz").about["schema"] == SCHEMA
 
 
 def test_a_case_is_accepted_when_it_is_done_stable_and_symmetric(data):
