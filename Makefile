@@ -18,7 +18,7 @@ demo: setup ## target curve -> design -> CAD -> finite elements -> report
 	$(DEMO)
 
 test: setup ## all tests; those of the finite elements again on 2 ranks
-	$(VENV)/python -m pytest -n $(RANKS) --dist loadfile
+	$(VENV)/python -m pytest -n $(RANKS) --dist worksteal
 	$(VENV)/pneunet run -n $(RANKS) -- python -m pytest -q -p no:cacheprovider tests/hifi tests/verification
 
 docs: setup ## run the commands of all pages and build their site, out/docs/index.html

@@ -32,5 +32,5 @@ say "whose the results are"
 tests="${PNEUNET_IMAGE_TESTS:-tests}"
 say "$tests in the image"
 in_image "$out" sh -c "cd /opt/pneunet &&
-    python -m pytest -q -p no:cacheprovider -n 2 --dist loadfile --junitxml /data/tests.xml $tests"
+    python -m pytest -q -p no:cacheprovider -n 2 --dist worksteal --junitxml /data/tests.xml $tests"
 say "passed"

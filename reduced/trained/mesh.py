@@ -19,22 +19,20 @@ from pneunet.reduced.trained.side_by_side import SideBySide
 class MeshDifference:
     """strains, stiffness: processes at Coordinates.lead_inputs of what is added to learned_strains and
     learned_stiffness of a state on the coarse grid; None where too few designs are computed on finer ones:
-    nothing is added then. left, stiffness_left (p,): part of that which a state on the fine grid still lacks;
+    nothing is added then. left, stiffness_left: part of that which a state on the fine grid still lacks;
     uncertainty: of strains so found, over themselves: half of a 90 % interval."""
 
     kind: str
     strains: SideBySide | None
     stiffness: SideBySide | None
-    left: np.ndarray
-    stiffness_left: np.ndarray
+    left: float
+    stiffness_left: float
     uncertainty: float
 
     @classmethod
     def none(cls, kind: str) -> "MeshDifference":
         """Of one grid alone."""
-        co = Coordinates(kind)
-        parts = np.ones(len(co.strain_parity)), np.ones(len(co.stiffness_parity))
-        return cls(kind, None, None, *parts, 0.0)
+        return cls(kind, None, None, 1.0, 1.0, 0.0)
 
     @cached_property
     def coordinates(self) -> Coordinates:

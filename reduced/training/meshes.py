@@ -54,8 +54,8 @@ class Differences:
     trust: np.ndarray
     slopes: Slopes
 
-    def fitted(self, some: np.ndarray, share: np.ndarray) -> SideBySide:
-        """The processes of the whole difference, `share` (p,) times these, from the states that are `some`
+    def fitted(self, some: np.ndarray, share: float) -> SideBySide:
+        """The processes of the whole difference, `share` times these, from the states that are `some`
         (n,)."""
         place = np.cumsum(some) - 1
         told = self.slopes.of(some[self.slopes.at])
@@ -152,8 +152,10 @@ def _differences(process, inputs, outputs, coarse, fine, slopes):
 
 
 def _interpolated(places, nodes, values):
-    """(k, ...) at places (k,) of values (m, ...) at increasing nodes (m,), linear, constant beyond; nan where
-    there are none."""
+    """(k, ...) at places (k,) of values (m, ...) at nodes (m,), linear, constant beyond; nan where there are
+    none."""
+    order = np.argsort(nodes)
+    nodes, values = nodes[order], values[order]
     out = np.full((len(places), *values.shape[1:]), np.nan)
     flat, found = values.reshape(len(nodes), -1), out.reshape(len(places), -1)
     for column, given in zip(found.T, flat.T):
@@ -164,12 +166,12 @@ def _interpolated(places, nodes, values):
 
 
 def _lacking(differences, leading):
-    """(what the fine grid still lacks (p,), over its difference from the coarse one; what of the strains may
+    """(what the fine grid still lacks, over its difference from the coarse one; what of the strains may
     be wrong by that)."""
     fine = differences[0]
     if len(differences) < 2 or not len(np.intersect1d(fine.states.design, differences[-1].states.design)):
         log.info(f"{fine.states.kind}: no design on a finest grid: the law is one of the fine grid")
-        return np.zeros(fine.values.shape[1]), 0.0
+        return 0.0, 0.0
     finest = differences[-1]
     before = np.full(finest.values.shape, np.nan)
     for number in np.unique(finest.states.design):
@@ -178,8 +180,7 @@ def _lacking(differences, leading):
         before[rows] = _interpolated(*leads, fine.values[own])
     known = np.isfinite(before).all(axis=1)
     trust, before, more = finest.trust[known], before[known], (finest.values - before)[known] / SEEN
-    share = (trust**2 * before * more).sum(axis=0) / np.maximum((trust**2 * before**2).sum(axis=0), 1e-30)
-    share = np.maximum(share, 0)
+    share = max((trust**2 * before * more).sum() / max((trust**2 * before**2).sum(), 1e-30), 0.0)
     wrong = np.abs(more - share * before) + ORDER_UNKNOWN * np.abs(share * before)
     states = finest.states.of(known)
     return share, float(np.quantile(_of_strains(states, trust * wrong), INTERVAL))

@@ -21,11 +21,11 @@ NEAR = 1e-4
 class States:
     """Free states of one kind on one grid, rest included: numbers (n, 15), pressure (n,), strains (n, 6),
     matrices (n, 6, 6), design (n,) numbers, size (n,): norm of the free strains, rest taken off, at the
-    case's top pressure; closing (n,): how far walls have come nearer, as if they could go on in the first
-    state after touch, over the load (Coordinates.closing_load) and the normal pitch; nan in the states beyond
-    and at rest. touching (n,) bool; stretch (n,): the largest; volume (n,) of air. strain_slopes (n, s, 6),
-    matrix_slopes (n, s, 6, 6): derivatives along the `directions` (s, 15) of the numbers, nan where not
-    known, while the pressure changes by pressure_slopes (n, s)."""
+    design's top pressure on the coarsest grid; closing (n,): how far walls have come nearer, as if they could
+    go on in the first state after touch, over the load (Coordinates.closing_load) and the normal pitch; nan
+    in the states beyond and at rest. touching (n,) bool; stretch (n,): the largest; volume (n,) of air.
+    strain_slopes (n, s, 6), matrix_slopes (n, s, 6, 6): derivatives along the `directions` (s, 15) of the
+    numbers, nan where not known, while the pressure changes by pressure_slopes (n, s)."""
 
     kind: str
     numbers: np.ndarray
@@ -57,6 +57,11 @@ class States:
         """(n, d) Coordinates.inputs."""
         return Coordinates(self.kind).inputs(self.numbers, self.pressure)
 
+    def measuring(self, others: "States") -> "States":
+        """States of the same designs with the `size` that these have: of paths that ended earlier."""
+        sizes = dict(zip(self.design, self.size))
+        return replace(others, size=np.array([sizes.get(d, s) for d, s in zip(others.design, others.size)]))
+
     def joined(self, other: "States") -> "States":
         """These, then the others."""
         both = {f.name: (getattr(self, f.name), getattr(other, f.name)) for f in fields(self)[1:-1]}
@@ -65,11 +70,12 @@ class States:
 
 @dataclass(frozen=True)
 class Sample:
-    """Cells of one kind on the coarsest grid: free States, and of those at prescribed strains the free state
-    (`around`, States), the change (m, 6) of the strains from there, the forces (m, 6), and doubled (m,) bool:
-    whether the strains are twice the free ones, others than those went in some direction. finer: free States
-    of some of the designs on finer grids, the finest last. Designs with a number below `drawn` are the
-    sample's, as held-out ones are; others were chosen."""
+    """Cells of one kind on the coarsest grid: free States (where walls touch also the states of other meshes
+    of that size, whose paths end there), and of cells at prescribed strains the free state (`around`,
+    States), the change (m, 6) of the strains from there, the forces (m, 6), and doubled (m,) bool: whether
+    the strains are twice the free ones; the others went in some direction. finer: free States of some of the
+    designs on finer grids, the finest last. Designs with a number below `drawn` are the sample's, as held-out
+    ones are; others were chosen."""
 
     free: States
     around: States
@@ -98,19 +104,28 @@ def sample_of(data: CellData, kind: str, held_out: bool) -> Sample:
     """The Sample of a kind's accepted cases in CellData, of the held-out designs or of all others."""
     k = data.about["kinds"].index(kind)
     cases = data.accepted & (data.kind == k) & (data.held_out == held_out)
-    sizes = [min(size for key, size in mesh.items() if key.endswith("_mm")) for mesh in data.about["meshes"]]
-    coarsest, *finer = np.argsort(-np.array(sizes))
+    sizes = np.array([min(v for key, v in m.items() if key.endswith("_mm")) for m in data.about["meshes"]])
+    coarse = sizes == sizes.max()
+    coarsest, finer = np.argmax(coarse), [m for m in np.argsort(-sizes) if not coarse[m]]
     usable = cases[data.case] & ~data.overlapping
-    states, row = _free_states(data, kind, np.flatnonzero(usable & (data.mesh[data.case] == coarsest)))
+    mesh = data.mesh[data.case]
+    states, row = _free_states(data, kind, np.flatnonzero(usable & (mesh == coarsest)))
     held = np.array([i for i in np.flatnonzero(usable & data.prescribed) if _state(data, i) in row], int)
     where = np.array([row[_state(data, i)] for i in held], int)
-    change = data.strains[held].astype(float) - states.strains[where]
-    free = states.strains[where] - REST
+    around = states.of(where)
+    change = data.strains[held].astype(float) - around.strains
+    free = around.strains - REST
     doubled = np.linalg.norm(change - free, axis=1) < 1e-3 * np.linalg.norm(free, axis=1)
-    others = (_free_states(data, kind, np.flatnonzero(usable & (data.mesh[data.case] == m))) for m in finer)
-    known = tuple(s for s, _ in others if len(s.design))
+    others = (_free_states(data, kind, np.flatnonzero(usable & (mesh == m)))[0] for m in finer)
+    known = tuple(states.measuring(s) for s in others if len(s.design))
+    again = (
+        coarse[mesh] & (mesh != coarsest) & np.isin(data.design[data.case], states.design[states.touching])
+    )
+    if (usable & again).any():
+        before, _ = _free_states(data, kind, np.flatnonzero(usable & again))
+        states = states.joined(states.measuring(before.loaded))
     drawn = data.about["campaign"].get("designs", np.inf)
-    return Sample(states, states.of(where), change, data.forces[held].astype(float), doubled, known, drawn)
+    return Sample(states, around, change, data.forces[held].astype(float), doubled, known, drawn)
 
 
 def _state(data, i):

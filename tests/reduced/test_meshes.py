@@ -1,9 +1,11 @@
 """What finer grids change: learned from few designs, and in the law."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pneunet.geometry.parameters import KINDS
+from pneunet.geometry.parameters import KINDS, TWISTING
 from pneunet.reduced.training.fit import fit_path, fit_stiffness
 from pneunet.reduced.training.judging import stiffness_error, strain_error
 from pneunet.reduced.training.meshes import converged, converged_sample, fit_meshes, truth
@@ -53,8 +55,20 @@ def test_stiffness_and_forces_go_along(learned):
 
 def test_the_share_that_the_fine_grid_lacks_is_found(learned):
     _, _, mesh = learned
-    assert mesh.left[0] == pytest.approx(0.3 / 1.3, rel=0.02)
-    assert mesh.stiffness_left == pytest.approx(np.full(len(mesh.stiffness_left), 0.3 / 1.3), rel=0.02)
+    assert [mesh.left, mesh.stiffness_left] == pytest.approx([0.3 / 1.3] * 2, rel=0.02)
+
+
+def test_where_walls_touch_the_coarse_grid_has_states_up_to_there_too():
+    """By a second mesh of its size; a design that does not touch has these states already."""
+    data, touches = made_up_data(12, grids=2), 2
+    about = data.about | {"meshes": [{"name": name, "mesh_size_mm": 2.0} for name in ("coarse", "before")]}
+    first = np.where((data.design == touches) & (data.mesh == 0), 0.2, np.nan)
+    sample = sample_of(replace(data, about=about, first_touch=first), TWISTING, held_out=False)
+    count = np.bincount(sample.free.design)
+    assert count[touches] == 2 * count[0] - 1  # at rest once
+    assert (count[[0, 6, 8, 10]] == count[0]).all() and not sample.finer
+    own = sample.free.of(sample.free.design == touches)
+    assert np.ptp(own.size) == 0 and own.touching.sum() == 2
 
 
 def test_too_few_designs_on_finer_grids_change_nothing(learned):
