@@ -165,15 +165,16 @@ def _fit_smooth(states, like, again):
     return fit_side_by_side(*data, (y.shape[1],), steep, like.smooth if like else None, settings)
 
 
-def fit_kind(sample: Sample, like: KindLaw | None = None, again: bool = True) -> KindLaw:
+def fit_kind(sample: Sample, like: KindLaw | None = None, again: bool = True, part: bool = False) -> KindLaw:
     """The KindLaw of a Sample; `like`: another one from whose metrics and noise the search for them starts,
     or, unless `again`, which are taken as they are. With finer grids the coarse one is learned first, then
-    what they change, and what that gives in the same way."""
+    what they change, and what that gives in the same way. part: of what `like` was learned from; its
+    quantiles and what is uncertain of its grids are taken too, and doubts are left out."""
     mesh, known = MeshDifference.none(sample.free.kind), (like.path, like.stiffness) if like else (None, None)
     if sample.finer:
         path = fit_path(sample.free, like.path if like else None, again)
         stiffness = fit_stiffness(sample.free, path.closing, like.stiffness if like else None, again)
-        mesh, again = fit_meshes(sample, path, stiffness), False
+        mesh, again = fit_meshes(sample, path, stiffness, like.mesh if like and part else None), False
         sample, known = converged_sample(sample, mesh), (path, stiffness)
     states, around = sample.free, sample.around
     path = fit_path(states, known[0], again)
@@ -187,15 +188,16 @@ def fit_kind(sample: Sample, like: KindLaw | None = None, again: bool = True) ->
     x = co.ranged(states.numbers, states.pressure)
     _, _, there = path.at(states.numbers, np.maximum(states.pressure, LOWEST))
     doubt = DOUBT * float(path.learned.processes[0].deviation(there).max())
-    path = with_cheap_doubt(path, there)
+    path = path if part else with_cheap_doubt(path, there)
     margin = MARGIN * (x.max(axis=0) - x.min(axis=0))
     low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
     low[0] = 0.0  # 90 degrees, where the angle and its mirror image meet, has data on both sides
     # where the sample of silicones begins: a neo-Hookean one
     low[co.stiffening] = np.minimum(low[co.stiffening], 0.0)
-    besides = fit_recorded(states, path.closing)
-    law = KindLaw(states.kind, path, stiffness, anharmonic, besides, mesh, np.ones(6), low, high, doubt)
-    return replace(law, quantile=_quantiles(law, states.loaded, sample.drawn))
+    besides = None if part else fit_recorded(states, path.closing)
+    quantile = like.quantile if like and part else np.ones(6)
+    law = KindLaw(states.kind, path, stiffness, anharmonic, besides, mesh, quantile, low, high, doubt)
+    return law if part else replace(law, quantile=_quantiles(law, states.loaded, sample.drawn))
 
 
 def fit_recorded(states: States, closing: Closing) -> Recorded | None:

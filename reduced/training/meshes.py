@@ -54,21 +54,23 @@ class Differences:
     trust: np.ndarray
     slopes: Slopes
 
-    def fitted(self, some: np.ndarray, share: float) -> SideBySide:
+    def fitted(self, some: np.ndarray, share: float, like: SideBySide | None = None) -> SideBySide:
         """The processes of the whole difference, `share` times these, from the states that are `some`
-        (n,)."""
+        (n,); like: other ones, whose metrics and noises are taken."""
         place = np.cumsum(some) - 1
         told = self.slopes.of(some[self.slopes.at])
         steep = Slopes(place[told.at], told.ways, share * told.values)
         data = self.inputs[some], share * self.values[some], self.states.design[some], self.trust[some]
         widths = (1, self.values.shape[1] - 1)
-        return fit_side_by_side(
-            *data, widths, steep, settings=FitSettings(most=MOST, inducing=INDUCING, noises=NOISES)
-        )
+        settings = FitSettings(most=MOST, inducing=INDUCING, noises=NOISES)
+        return fit_side_by_side(*data, widths, steep, like, settings)
 
 
-def fit_meshes(sample: Sample, path: FreePath, stiffness: FreeStiffness) -> MeshDifference:
-    """The MeshDifference of a Sample, of which `path` and `stiffness` are those of the coarse grid."""
+def fit_meshes(
+    sample: Sample, path: FreePath, stiffness: FreeStiffness, like: MeshDifference | None = None
+) -> MeshDifference:
+    """The MeshDifference of a Sample, of which `path` and `stiffness` are those of the coarse grid; like: one
+    of more designs, whose metrics, noises and uncertainty are taken."""
     kind, co = sample.free.kind, Coordinates(sample.free.kind)
     both = np.intersect1d(sample.designs, sample.finer[0].design) if sample.finer else []
     if len(both) < TELLING:
@@ -102,15 +104,21 @@ def fit_meshes(sample: Sample, path: FreePath, stiffness: FreeStiffness) -> Mesh
     ]
     lacking, doubt = _lacking(of_strains, co.leading)
     stiffness_lacking, _ = _lacking(of_stiffness, co.leading)
-    missed = _cross_validated(of_strains[0], 1 + lacking)
+    taken = (like.strains, like.stiffness) if like else (None, None)
     every = [np.ones(len(found[0].inputs), bool) for found in (of_strains, of_stiffness)]
+    processes = of_strains[0].fitted(every[0], 1 + lacking, taken[0])
+    if like and like.strains:
+        uncertain = like.uncertainty
+    else:
+        missed = _cross_validated(of_strains[0], 1 + lacking, processes)
+        uncertain = float(np.hypot(missed, doubt))
     return MeshDifference(
         kind,
-        of_strains[0].fitted(every[0], 1 + lacking),
-        of_stiffness[0].fitted(every[1], 1 + stiffness_lacking),
+        processes,
+        of_stiffness[0].fitted(every[1], 1 + stiffness_lacking, taken[1]),
         lacking / (1 + lacking),
         stiffness_lacking / (1 + stiffness_lacking),
-        float(np.hypot(missed, doubt)),
+        uncertain,
     )
 
 
@@ -199,13 +207,13 @@ def _of_strains(states, error):
     return np.hypot(error[:, 0] / np.maximum(steep, FLATTEST), np.linalg.norm(error[:, 1:], axis=1))
 
 
-def _cross_validated(differences, share):
-    """Half of a 90 % interval of what is missed of the strains of designs that have not been learned from,
-    over the leading strain."""
+def _cross_validated(differences, share, like):
+    """Half of a 90 % interval of what processes with the metrics and noises of `like` miss of the strains of
+    designs that they have not learned from, over the leading strain."""
     number, missed = differences.states.design, []
     for part in folds(np.unique(number), PARTS):
         out = np.isin(number, part)
-        found = differences.fitted(~out, share)(differences.inputs[out])
+        found = differences.fitted(~out, share, like)(differences.inputs[out])
         error = differences.trust[out] * (found - share * differences.values[out])
         missed.append(_of_strains(differences.states.of(out), error))
     return float(np.quantile(np.concatenate(missed), INTERVAL))

@@ -135,8 +135,8 @@ def judge(laws: dict[str, KindLaw], samples: Samples, mapping: Map = map) -> dic
 
 
 def judge_again(law: KindLaw, learned: Sample, judged: Sample) -> Misses:
-    """`misses` on a Sample of the law that another Sample gives, with the metrics of this one."""
-    return misses(fit_kind(learned, law, again=False), judged)
+    """`misses` on a Sample of the law that another Sample gives, a part of what this one was learned from."""
+    return misses(fit_kind(learned, law, again=False, part=True), judged)
 
 
 def judged_on(training: Sample, held_out: Sample) -> str:
