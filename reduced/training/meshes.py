@@ -32,7 +32,7 @@ SEEN = 1 - 2**-ORDER
 #: part of what the fine grid lacks that its extrapolation may be wrong by: orders of 0.9 to 1.5
 ORDER_UNKNOWN = 0.2
 #: designs on both grids that suffice to learn the difference; parts of its cross-validation
-TELLING, PARTS = 8, 5
+TELLING, PARTS = 8, 10
 #: bounds of its processes' noises, over its own variance; states that their metrics are found on, and as many
 #: slopes; their inducing points
 NOISES = tuple((np.log(1e-6), np.log(most)) for most in (0.1, 0.1, 10.0))
