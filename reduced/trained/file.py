@@ -139,8 +139,8 @@ def _members(about: dict, names: Collection[str]) -> dict[str, Member]:
             "low": ranged,
             "high": ranged,
             "doubt": Member("f", (), POSITIVE),
-            "left": Member("f", (len(co.strain_parity),)),
-            "stiffness_left": Member("f", (len(co.stiffness_parity),)),
+            "left": Member("f", ()),
+            "stiffness_left": Member("f", ()),
             "uncertainty": Member("f", (), 0.0),
             "anharmonic/coefficients": Member("f", (len(monomials(kind)), d + 3)),
             "anharmonic/centre": Member("f", (d + 2,)),
@@ -165,10 +165,8 @@ def _read_kind(stored, kind):
     # of how walls close and touch, and of finer grids, there may be none
     known = Closing(kind, beside.get(closing)), beside[learned], beside[start]
     cheap = (stored[f"{kind}/{name}"] for name in ("remainder", "landmarks"))
-    left, stiffness_left, uncertainty = (stored[f"{kind}/{name}"] for name in OF_MESH)
-    difference = MeshDifference(
-        kind, beside.get(mesh), beside.get(mesh_stiffness), left, stiffness_left, float(uncertainty)
-    )
+    of_mesh = (float(stored[f"{kind}/{name}"]) for name in OF_MESH)
+    difference = MeshDifference(kind, beside.get(mesh), beside.get(mesh_stiffness), *of_mesh)
     return KindLaw(
         kind,
         FreePath(kind, *known, float(stored[f"{kind}/furthest"]), *cheap),
