@@ -43,7 +43,7 @@ def statements(found: dict) -> list[Statement]:
     doubted = "; ".join(dict.fromkeys(text for name in BODIES for text in found[name]["doubts"])) or "nothing"
     second = {name: found[name]["curvature"][1] for name in MIXED}
     third = found["iii"]["curvature"]
-    limit = next((text for text in found["iii"]["doubts"] if "limit load" in text), "")
+    beyond = next((text for text in found["iii"]["doubts"] if "limit load" in text or "/ mu" in text), "")
     return [
         Statement(
             '"the deformation increases with the decrease in E at a fixed pressure" (50 kPa, 0.8 to 0.4 MPa)',
@@ -60,8 +60,8 @@ def statements(found: dict) -> list[Statement]:
         ),
         Statement(
             "(iii) with 0.9 + 0.3 + 0.9 MPa bends mostly in its middle at 50 kPa",
-            f"curvatures {', '.join(f'{c:.1f}' for c in third)} 1/m; but {limit or 'no limit load is met'}",
-            bool(third[1] > 2 * max(third[0], third[2])) if not limit else None,
+            f"curvatures {', '.join(f'{c:.1f}' for c in third)} 1/m{f'; but {beyond}' if beyond else ''}",
+            bool(third[1] > 2 * max(third[0], third[2])) if not beyond else None,
         ),
     ]
 
