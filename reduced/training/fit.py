@@ -74,16 +74,21 @@ def fit_path(
 
     x, y = inputs(states), outputs(states)
     good = np.isfinite(y).all(axis=1)  # the leading strain is larger than 0
-    steep = None
+    at_pressure = states.inputs
+
+    def ease(s: States) -> np.ndarray:
+        return -outputs(s)[:, :1]
+
+    steep, rising = None, None
     if slopes:
         known = known_slopes(states.strain_slopes) & told_by_angle(states)
         steep = slopes_of(states, known, inputs, outputs, good)
         steep = steep.of((np.abs(in_deviations(steep, x[good])) < STEEPEST).all(axis=1))
+        rising = slopes_of(states, known, lambda s: s.inputs, ease, good)
+        rising = rising.of((np.abs(in_deviations(rising, at_pressure[good])) < STEEPEST).all(axis=1))
     learned = fit_strains(states, good, x, y, steep, like.learned if like else None, again)
-    rough, trust = FitSettings(inducing=ROUGH), np.ones((good.sum(), 1))
-    start = fit_side_by_side(
-        states.inputs[good], -y[good, :1], states.design[good], trust, (1,), settings=rough
-    )
+    data = at_pressure[good], -y[good, :1], states.design[good], np.ones((good.sum(), 1)), (1,), rising
+    start = fit_side_by_side(*data, like.start if like else None, FitSettings(inducing=ROUGH, again=again))
     furthest = FURTHEST * float(co.leading(states.strains).max())
     none, first = np.zeros((2, 2)), np.arange(min(LANDMARKS, len(learned.processes[0].inducing)))
     return FreePath(states.kind, closing, learned, start, furthest, none, first)
