@@ -180,9 +180,12 @@ def calibration():
     return best
 
 
-def merge(path, entries):
+def merge(path, entries, kept=None):
+    """What the file holds with the entries added, as far as it is among those `kept` (default: all)."""
     known = json.loads(path.read_text()) if path.exists() else {}
-    write_text(path, json.dumps(known | entries, indent=1, sort_keys=True) + "\n")
+    known = {key: value for key, value in (known | entries).items() if kept is None or key in kept}
+    write_text(path, json.dumps(known, indent=1, sort_keys=True) + "\n")
+    return known
 
 
 def demo_picture():
@@ -205,14 +208,13 @@ def demo_picture():
 
 
 def snapshot():
-    """Merge the results into docs/, parts not measured anew kept; write the table of figures and the README's
-    picture."""
+    """Merge the results into docs/, parts not measured anew kept and such that are gone dropped; write the
+    table of figures and the README's picture."""
     if (ROOT / "out" / "demo" / "report").is_dir():
         demo_picture()
-    for name in ("results.json", "results.meta.json"):
-        merge(ROOT / "docs" / name, json.loads((OUT / name).read_text()))
     results, meta = (
-        json.loads((ROOT / "docs" / name).read_text()) for name in ("results.json", "results.meta.json")
+        merge(ROOT / "docs" / name, json.loads((OUT / name).read_text()), known)
+        for name, known in (("results.json", MEANING), ("results.meta.json", PARTS))
     )
     lines = ["# Figures", "", "Made by `make bench` and `python -m benchmarks --snapshot`; do not edit.", ""]
     rows = [
