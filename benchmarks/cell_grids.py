@@ -12,7 +12,7 @@ KINDS = ("one_sided_w10", "twist_w12")
 PRESSURES = (0.02, 0.05)
 #: mm: the usual grid; tetrahedra that it is compared with; grids with layers at planes with re-entrant edges,
 #: whose last two are extrapolated from. The middle one is the fine grid of CELL.toml's `graded`
-DEFAULT, TETRAHEDRA, LAYERED, FINE = 1.5, 2.0, (2.0, 1.0, 0.5), 1.0
+DEFAULT, TETRAHEDRA, LAYERED, FINE = 1.5, 2.0, (1.5, 1.0, 2 / 3), 1.0
 #: of convergence at edges of 270 degrees: twice the exponent of their singularity
 ORDER = 2 * 0.5445
 #: whose walls touch, and its grids without layers in a constant ratio, mm
