@@ -31,9 +31,9 @@ NAMED = re.compile(r"\[([\w-]+\.md)\]\(")
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\s*\\[(\[](.*?)\\[)\]]\s*</\1>', re.S)
 
 
-def on_config(config):
-    as_installed()  # where mkdocstrings reads docstrings: nothing is imported
-    return config
+def on_startup(command, dirty):
+    # where mkdocstrings reads docstrings: nothing is imported. It looks for the folder before on_config comes here
+    as_installed()
 
 
 def on_files(files: Files, config):
