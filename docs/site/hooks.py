@@ -32,7 +32,7 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\s*\\[(\[](.*?)\\[)\]]\s*<
 
 
 def on_startup(command, dirty):
-    # where mkdocstrings reads docstrings: nothing is imported. It looks for the folder before on_config comes here
+    # where mkdocstrings reads docstrings, nothing is imported: it looks for the folder before any on_config
     as_installed()
 
 
