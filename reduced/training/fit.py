@@ -83,15 +83,20 @@ def fit_path(
     if slopes:
         known = known_slopes(states.strain_slopes) & told_by_angle(states)
         steep = slopes_of(states, known, inputs, outputs, good)
-        steep = steep.of((np.abs(in_deviations(steep, x[good])) < STEEPEST).all(axis=1))
+        steep = _gentle(steep, x[good])
         rising = slopes_of(states, known, lambda s: s.inputs, ease, good)
-        rising = rising.of((np.abs(in_deviations(rising, at_pressure[good])) < STEEPEST).all(axis=1))
+        rising = _gentle(rising, at_pressure[good])
     learned = fit_strains(states, good, x, y, steep, like.learned if like else None, again)
     data = at_pressure[good], -y[good, :1], states.design[good], np.ones((good.sum(), 1)), (1,), rising
     start = fit_side_by_side(*data, like.start if like else None, FitSettings(inducing=ROUGH, again=again))
     furthest = FURTHEST * float(co.leading(states.strains).max())
     none, first = np.zeros((2, 2)), np.arange(min(LANDMARKS, len(learned.processes[0].inducing)))
     return FreePath(states.kind, closing, learned, start, furthest, none, first)
+
+
+def _gentle(slopes, inputs):
+    """The Slopes below STEEPEST, at inputs (n, d)."""
+    return slopes.of((np.abs(in_deviations(slopes, inputs)) < STEEPEST).all(axis=1))
 
 
 def fit_strains(
@@ -164,7 +169,7 @@ def _fit_smooth(states, like, again):
     known = known_slopes(states.matrix_slopes) & told_by_angle(states)
     known &= ~states.touching[:, None]
     steep = slopes_of(states, known, inputs, outputs, np.ones(len(y), bool))
-    steep = steep.of((np.abs(in_deviations(steep, x)) < STEEPEST).all(axis=1))
+    steep = _gentle(steep, x)
     data = x, y, states.design, _trust_in_stiffness(states)
     settings = FitSettings(inducing=OF_STIFFNESS, again=again)
     return fit_side_by_side(*data, (y.shape[1],), steep, like.smooth if like else None, settings)

@@ -35,6 +35,15 @@ def test_fig_3_twist_over_pressure_and_angle():
     assert np.nanmax(found["printed"]) < fig3.PAPER_MOST / 20
 
 
+@pytest.mark.xfail(
+    strict=True, reason="of 65 twisting designs few touch: the law is 5 to 11 % off on twist-w15"
+)
+def test_fig_3_the_law_twists_as_cells_do():
+    at = [list(fig3.ANGLES).index(a) for a in (60.0, 45.0)]
+    # unit cells of twist-w15 with contact (docs/paper-models.md), which the law has 2 % to know by
+    assert 1e3 * fig3.compute()["tau"][at, -1] == pytest.approx([40.7, 46.2], rel=0.03)
+
+
 def test_fig_4_segments_make_curvature_vary():
     found = fig4.compute()
     assert verdicts(fig4, found) == [True, True, True, None]
