@@ -141,7 +141,11 @@ class Job:
         """Give it the signal that SLURM gives shortly before; returns when it is in the queue again."""
         subprocess.run(["scancel", "--batch", "--signal=USR1", self.number], env=self.env, check=True)
         self.wait_for(lambda: "back into the queue" in self.log.read_text())
-        self.wait_for(lambda: self.state() != "RUNNING")
+        self.wait_for(lambda: self.state() == "PENDING")
+        # SLURM holds it back for two minutes, whatever its configuration says
+        subprocess.run(
+            ["scontrol", "update", f"JobId={self.number}", "StartTime=now"], env=self.env, check=True
+        )
 
     def wait_for(self, true: Callable[[], object], seconds: float = 400.0) -> None:
         """Until it is true; RuntimeError with the end of the log after so many seconds."""

@@ -1,6 +1,7 @@
 """The only place that knows the difference between dolfinx 0.5 (Debian 12) and 0.9 (Debian 13)."""
 
 import logging
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import dolfinx
 import dolfinx.fem.petsc
 import ffcx
+import ffcx.codegeneration.jit
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -18,7 +20,7 @@ from ufl.core.expr import Expr
 from pneunet.base.system.interrupts import kept
 from pneunet.geometry import meshfile
 from pneunet.hifi.fem.agreement import on_rank_0
-from pneunet.hifi.fem.form_cache import form_cache, locked_form_cache
+from pneunet.hifi.fem.form_cache import form_cache, lock_module, make_form_cache
 
 with kept():
     from dolfinx.io import gmshio  # which loads gmsh
@@ -48,17 +50,45 @@ setattr(_FFCX, _LOADER, lambda: ({}, {}))
 setattr(dolfinx.jit, _LOADER, lambda: ({"cache_dir": form_cache(), "cffi_extra_compile_args": _FLAGS}, {}))
 
 
+def _with_locks(find, make):
+    """ffcx's functions that find a compiled module and make it, its lock held from the one to the other."""
+    held = {}
+
+    def find_locked(name, *rest):
+        lock, found = lock_module(name), (True, None)
+        try:
+            found = find(name, *rest)
+        finally:
+            if found[0] is None:
+                held[name] = lock
+            else:
+                os.close(lock)
+        return found
+
+    def make_locked(declarations, objects, names, name, *rest, **more):
+        try:
+            return make(declarations, objects, names, name, *rest, **more)
+        finally:
+            os.close(held.pop(name))
+
+    return find_locked, make_locked
+
+
+_jit = ffcx.codegeneration.jit
+_jit.get_cached_module, _jit._compile_objects = _with_locks(_jit.get_cached_module, _jit._compile_objects)
+
+
 @contextmanager
 def _compiler(comm: MPI.Comm) -> Iterator[None]:
     """Where forms are compiled. It logs every gcc line at level INFO, and ffcx has the root logger print that
     to standard error."""
     before = logging.root.manager.disable
-    with locked_form_cache(comm):
-        logging.disable(logging.INFO)
-        try:
-            yield
-        finally:
-            logging.disable(before)
+    make_form_cache(comm)
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _name_spacing(domain):

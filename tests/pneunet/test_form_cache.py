@@ -6,6 +6,8 @@ import subprocess
 import sys
 import time
 
+from pneunet.hifi.fem.form_cache import form_cache, lock_module
+
 FORM = """
 from pneunet.base.errors import InputError
 from pneunet.hifi.fem import compat
@@ -54,6 +56,15 @@ def test_a_kill_while_a_form_compiles_stops_nobody(tmp_path):
     for process in both:
         assert process.communicate(timeout=60) == ("\n", "") and process.returncode == 0
     assert half.with_suffix(".c.cached").exists()
+
+
+def test_who_wants_another_form_than_a_neighbour_does_not_wait(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    form_cache().mkdir(parents=True)
+    lock = lock_module("libffcx_forms_of_a_neighbour")
+    process = start(FORM, tmp_path)
+    assert process.communicate(timeout=60) == ("\n", "") and process.returncode == 0
+    os.close(lock)
 
 
 def test_a_cache_that_cannot_be_written_to_is_one_line(tmp_path):
