@@ -20,7 +20,6 @@ top_pressure_over_mu = 0.1
 [[mesh]]
 name = "coarse"
 mesh_size_mm = 6
-element = "tetrahedra"
 prescribed = 2
 slopes = true
 stiffness_slopes = true

@@ -36,6 +36,7 @@ chambers = 2
 [[case]]
 [[case]]
 mu_MPa = 0.001
+chambers = 1
 """
 
 
