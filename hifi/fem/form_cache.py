@@ -45,9 +45,10 @@ def lock_module(name: str) -> int:
     """Wait for the module's lock and remove the module if it is half; os.close(what this returns) unlocks."""
     locks = _open_locks()
     fcntl.lockf(locks, fcntl.LOCK_EX, 1, int.from_bytes(hashlib.sha256(name.encode()).digest()[:7], "big"))
-    source = form_cache() / f"{name}.c"  # beside it, when it is whole, NAME.c.cached
-    if not source.with_suffix(".c.cached").exists():
-        source.unlink(missing_ok=True)
+    both = [form_cache() / f"{name}.c{whole}" for whole in ("", ".cached")]  # when it is whole
+    if not all(file.exists() for file in both):
+        for file in both:
+            file.unlink(missing_ok=True)
     return locks
 
 
