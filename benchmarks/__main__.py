@@ -144,9 +144,13 @@ PARTS = {
     "contact": (
         contact.contact,
         (
-            "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by third medium; 15"
+            "self-contact in the unit cell twist-w15: distance, bias, sensitivity, check by third medium; 5"
             " minutes"
         ),
+    ),
+    "contact-segment": (
+        contact.in_a_segment,
+        "self-contact in five pairs of chambers on 2 ranks against the cell: twist, cost; some 15 minutes",
     ),
     "paper": (
         paper.paper,
@@ -235,9 +239,9 @@ def snapshot():
     if "rod-fe" in meta:
         page = ROOT / "docs" / "theory-reduced.md"
         write_text(page, rod.page(page.read_text(), meta["rod-fe"]["details"]))
-    if "contact" in meta:
+    if {"contact", "contact-segment"} <= set(meta):
         page = ROOT / "docs" / "contact.md"
-        write_text(page, contact_page.page(page.read_text(), results, meta["contact"]["details"]))
+        write_text(page, contact_page.page(page.read_text(), results, meta))
     if "paper" in meta:
         write_text(ROOT / "docs" / "paper-models.md", paper_page.page(meta, ROOT / "docs"))
     if "verification" in meta:

@@ -230,16 +230,8 @@ def exact(reference):
     }
 
 
-def segment_on_two_ranks(reference):
-    """The middle of a finite segment against the cell."""
-    from benchmarks.contact_segment import beside_cell
-
-    figures, facts = beside_cell({s.pressure: twist(s) for s in reference.states}, reference.folder)
-    return figures, {"segment": facts}
-
-
 #: each takes the Reference and returns ({key: number}, details)
-PIECES = (angles, bias, parameters, finer_mesh, force_check, exact, segment_on_two_ranks)
+PIECES = (angles, bias, parameters, finer_mesh, force_check, exact)
 
 
 def contact(pieces=PIECES):
@@ -270,3 +262,12 @@ def contact(pieces=PIECES):
             figures |= found
             details |= more
     return figures, details
+
+
+def in_a_segment():
+    """The part `contact-segment`: ({key: value}, details), of a finite segment's middle against the cell."""
+    from benchmarks.contact_segment import beside_cell
+
+    with tempfile.TemporaryDirectory() as folder:
+        states = run(folder, segment(), "auto")[0]
+        return beside_cell({s.pressure: twist(s) for s in states}, Path(folder))

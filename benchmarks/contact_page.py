@@ -1,13 +1,14 @@
-"""The tables at the end of docs/contact.md, from the details of the part `contact`."""
+"""The tables at the end of docs/contact.md, from the details of the parts `contact` and `contact-segment`."""
 
 from benchmarks.contact import ANGLES, ELEMENT, FINE, FINER, PARAMETERS, SIZE
 from benchmarks.tables import below_mark, table
 
 
-def page(text, results, details):
+def page(text, results, meta):
     """docs/contact.md, of which `text` is the present one, with the part below its mark made anew."""
+    details, segment = (meta[part]["details"] for part in ("contact", "contact-segment"))
     medium = {kPa: limit for kPa, _, limit, _, _ in details["kPa_force_N_and_limit_tau_and_limit"]}
-    segment, effort = details["segment"], details["steps_factorisations_CPU_s"]
+    effort = details["steps_factorisations_CPU_s"]
     lines = [
         "## Measured",
         "",

@@ -1,4 +1,4 @@
-"""The finite segment of the part `contact`: five pairs of chambers of twist-w15 to 50 kPa, with contact and
+"""The part `contact-segment`: five pairs of chambers of twist-w15 to 50 kPa, with contact and
 without, on as many ranks as it is started on.
 
     pneunet run -n 2 -- python -m benchmarks.contact_segment FOLDER
