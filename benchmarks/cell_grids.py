@@ -198,8 +198,8 @@ ABOUT = f"""\
 Both kinds at 60 degrees on sheared grids of hexahedra, half a cell or a quarter, 0 to 50 kPa. *layers*: one
 element of a fifth of the largest on each side of planes with re-entrant edges. The limit is extrapolated from
 the last two grids with layers that reach a pressure, at order {ORDER:.2f}, which edges of 270 degrees allow;
-the observed order, of all three, stands below. Errors are norms of (e, k pitch) over the norm of the extrapolated
-strain. Processor seconds are of five levels with the stiffness at each, or of the free states
+the observed order, of all three, stands below. Errors are norms of (e, k pitch) over the norm of the
+extrapolated strain. Processor seconds are of five levels with the stiffness at each, or of the free states
 alone.""".splitlines()
 CONTACT = f"""\
 {TOUCHING}, whose walls touch, at 50 kPa on grids without layers: errors against the last two, extrapolated at
