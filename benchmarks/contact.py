@@ -160,15 +160,17 @@ def finer_mesh(reference):
 
 
 def limit(values):
-    """Where values at SOFTNESSES go as the medium vanishes: by the polynomial through them (Richardson)."""
+    """Where values at the first of SOFTNESSES go as the medium vanishes: by the polynomial through them
+    (Richardson)."""
     from pneunet.hifi.path.stepping import lagrange_coefficients
 
-    return float(np.dot(lagrange_coefficients(SOFTNESSES, 0.0), values))
+    return float(np.dot(lagrange_coefficients(SOFTNESSES[: len(values)], 0.0), values))
 
 
 def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSES):
-    """[[kPa, force (N) and twist (rad/m) at each of the softnesses]] of the third medium; ConvergenceError
-    where it finds no state."""
+    """[[kPa, force (N) and twist (rad/m) at each of the softnesses, as far as states are found]] of the third
+    medium; ConvergenceError where there are fewer than two."""
+    from pneunet.base.errors import ConvergenceError
     from pneunet.geometry.cad.grid import grid_cell
     from pneunet.hifi.cell.problem import CellProblem
     from pneunet.hifi.cell.run import CONTACT_PATIENCE
@@ -190,9 +192,13 @@ def medium_forces(body, path, size=SIZE, pressures=CHECKED, softnesses=SOFTNESSE
         kept, row, medium = system.state.copy(), [pressure * 1e3], followed
         for softness in softnesses:
             energy.between(medium)
-            run_steps(
-                EquilibriumPath(Softening(system, energy), LoadControl(), options), 1.0, StepSize(0.5, 1e-3)
-            )
+            softened = EquilibriumPath(Softening(system, energy), LoadControl(), options)
+            try:
+                run_steps(softened, 1.0, StepSize(0.5, 1e-3))
+            except ConvergenceError:
+                if len(row) < 5:  # two softnesses
+                    raise
+                break
             e, k = np.split(system.state[-6:], 2)
             row += [problem.measure_contact().force, k[0] / e[0] * 1e3]
             medium = followed.softer(softness, softness / 2)

@@ -75,10 +75,13 @@ def page(text, results, meta):
         ],
     )
     lines += shown(
-        "Force in the third medium: as recorded, one half and one quarter as stiff and thick, and in the"
-        " limit:",
-        {"kPa": "g", "recorded, N": ".5f", "half, N": ".5f", "quarter, N": ".5f", "limit, N": ".4f"},
-        [[kPa, *found[::2], medium[kPa]] for kPa, *found in details["kPa_force_N_tau_of_softer_media"]],
+        "Force in the third medium: as recorded, one half and one quarter as stiff and thick as far as states"
+        " are found, and in the limit:",
+        {"kPa": "g", "recorded, N": "", "half, N": "", "quarter, N": "", "limit, N": ".4f"},
+        [
+            [kPa, *([f"{force:.5f}" for force in found[::2]] + [""])[:3], medium[kPa]]
+            for kPa, *found in details["kPa_force_N_tau_of_softer_media"]
+        ],
     )
     lines += shown(
         f"The middle pitch of {segment['chambers']} pairs of chambers on {segment['ranks']} ranks"
