@@ -1,4 +1,4 @@
-"""The part `contact-segment`: five pairs of chambers of twist-w15 to 50 kPa, with contact and
+"""The part `contact-segment`: five pairs of chambers of twist-w15 to 40 kPa, with contact and
 without, on as many ranks as it is started on.
 
     pneunet run -n 2 -- python -m benchmarks.contact_segment FOLDER
@@ -17,7 +17,8 @@ from benchmarks.contact import ELEMENT, SIZE
 
 ROOT = Path(__file__).resolve().parent.parent
 CHAMBERS, RANKS = 5, 2
-LEVELS = (0.01, 0.02, 0.03, 0.04, 0.05)
+#: MPa. Not to 50 kPa: without contact, chambers far inside one another, Newton's method finds no state beyond 45
+LEVELS = (0.01, 0.02, 0.03, 0.04)
 
 
 def run(folder):
