@@ -94,8 +94,8 @@ def page(text, results, meta):
         ],
     )
     lines += shown(
-        "To 50 kPa in five levels, meshing included; processor time of the segment to 40 kPa with contact over"
-        f" without {results['contact_segment_cost_factor']:.2f}:",
+        "To 50 kPa in five levels, meshing included; processor time of the segment to 40 kPa with contact"
+        f" over without {results['contact_segment_cost_factor']:.2f}:",
         {"contact": "", "steps": "g", "factorisations": "g", "processor seconds": ".1f"},
         [["with", *effort[0]], ["without", *effort[1]]],
     )

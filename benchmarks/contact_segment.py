@@ -17,7 +17,8 @@ from benchmarks.contact import ELEMENT, SIZE
 
 ROOT = Path(__file__).resolve().parent.parent
 CHAMBERS, RANKS = 5, 2
-#: MPa. Not to 50 kPa: without contact, chambers far inside one another, Newton's method finds no state beyond 45
+#: MPa. Not to 50 kPa: without contact chambers are far inside one another there, and no state is found from
+#: 45 kPa on
 LEVELS = (0.01, 0.02, 0.03, 0.04)
 
 
