@@ -22,7 +22,7 @@ from pneunet.geometry.cad.mould_solids import MouldPiece
 from pneunet.geometry.ends import Bar, placed
 from pneunet.geometry.moulds.layers import LOWER, MIDDLE, UPPER, Run, runs
 from pneunet.geometry.moulds.parameters import Moulds, printed
-from pneunet.geometry.moulds.part import Part
+from pneunet.geometry.moulds.part import Part, outward
 from pneunet.geometry.parameters import Manipulator
 from pneunet.geometry.sections import whole_section
 
@@ -90,13 +90,14 @@ def solid(build: Callable[[], int], shift: np.ndarray, over: bool, step: Path | 
 
 def _triangles(volume):
     """(points, triangles) of the mesh on a volume's surface, outward."""
-    gmsh.model.mesh.setOutwardOrientation(volume)  # signs of faces mean another thing in each version
     faces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
     corners = np.concatenate([gmsh.model.mesh.getElementsByType(TRIANGLE, tag)[1] for tag in faces])
     numbers, points, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(numbers)
     used, triangles = np.unique(np.searchsorted(numbers[order], corners), return_inverse=True)
-    return points.reshape(-1, 3)[order][used], triangles.reshape(-1, 3)
+    points = points.reshape(-1, 3)[order][used]
+    # not gmsh's setOutwardOrientation, which turns the bottoms of blind holes inwards on Debian 13
+    return points, outward(points, triangles.reshape(-1, 3))
 
 
 def body_part(

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from pneunet.base.errors import InputError
 from pneunet.geometry.meshfile import open_edges
@@ -72,6 +74,28 @@ class Part:
             if facts["undercut_mm2"] > NOTHING:
                 raise InputError(f"{self.name}: a section grows upwards: it could not be pulled out")
         return facts
+
+
+def outward(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Triangles (m, 3) of the closed surface of one solid, of points (n, 3), in the order of corners by which
+    their normals point out of it, into its voids too; as they are where it is not closed."""
+    if open_edges(triangles):
+        return triangles
+    m = len(triangles)
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    pairs = np.lexsort(np.sort(edges, axis=1).T).reshape(-1, 2)
+    (i, j), (a, b) = pairs.T // 3, edges[pairs.T, 0]
+    # a triangle as it is (i) goes with its neighbour as it is (j) or turned (j + m): the way that they run
+    # along their edge must be opposite
+    rows, columns = np.concatenate([i, i + m]), np.concatenate([j + m * (a == b), j + m * (a != b)])
+    graph = coo_array((np.ones(len(rows)), (rows, columns)), (2 * m, 2 * m))
+    as_is, turned = connected_components(graph, directed=False)[1].reshape(2, m)
+    found = np.where((as_is > turned)[:, None], triangles[:, ::-1], triangles)
+    shell, corners = np.unique(np.minimum(as_is, turned), return_inverse=True)[1], points[found]
+    volumes = np.bincount(shell, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
+    wanted = -np.ones(len(volumes))
+    wanted[np.abs(volumes).argmax()] = 1
+    return np.where((volumes * wanted < 0)[shell][:, None], found[:, ::-1], found)
 
 
 def as_manifold(points: np.ndarray, triangles: np.ndarray, name: str = "surface") -> Any:

@@ -13,7 +13,7 @@ from pneunet.geometry.cad.moulds import body_part, mould_parts
 from pneunet.geometry.meshfile import open_edges
 from pneunet.geometry.moulds.layers import cut, runs
 from pneunet.geometry.moulds.parameters import Moulds, printed
-from pneunet.geometry.moulds.part import Part, cast, undercut
+from pneunet.geometry.moulds.part import Part, cast, outward, undercut
 from pneunet.geometry.parameters import Manipulator, Segment
 
 CORE = {"roof": 1.5, "channel_width": 3.0}
@@ -58,6 +58,19 @@ def test_moulds_are_closed_can_be_pulled_and_leave_the_body(name):
     assert whole.volume == pytest.approx(of_layers(body), rel=1e-9)
     assert (left - whole.manifold()).volume() < 1e-9 * whole.volume
     assert (whole.manifold() - left).volume() < 1e-9 * whole.volume
+
+
+def test_triangles_turn_outwards_whatever_their_order_and_into_voids():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    shell = corners * 10 - 1  # with a tetrahedron as its void
+    points, right = np.concatenate([shell, corners]), np.concatenate([tetrahedron, tetrahedron[:, ::-1] + 4])
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        mixed = np.where(random.integers(2, size=(8, 1)) == 1, right[:, ::-1], right)
+        assert (outward(points, mixed) == right).all()
+    assert Part("hollow", "", points, right).volume == pytest.approx((1000 - 1) / 6)
+    assert (outward(points, right[1:]) == right[1:]).all()
 
 
 @pytest.mark.parametrize(
