@@ -261,7 +261,12 @@ def page(meta, folder):
 
 
 #: part -> lines that it adds to the page from its details
-SECTIONS = {"cell": cell.section, "cell-grids": cell_grids.section, "segments": segments.section}
+SECTIONS = {
+    "cell": cell.section,
+    "cell-grids": cell_grids.section,
+    "contact-grids": cell_grids.contact_section,
+    "segments": segments.section,
+}
 
 
 def _cook(details):
