@@ -31,8 +31,8 @@ OLD = tuple(int(p) for p in dolfinx.__version__.split(".")[:2]) < (0, 7)
 ORDERING = 4 if OLD else 5
 #: sums may be reordered and pow need not set errno, so that loops over quadrature points vectorise: residuals
 #: take a third of the time, tangents 0.8 (infinities and NaN keep their meaning: they tell Newton's method
-#: that a step went too far). Debian 13's gcc 14 needs minutes for the largest forms at -O2, and seconds so for
-#: code that is as fast
+#: that a step went too far). Debian 13's gcc 14 needs minutes for the largest forms at -O2, and seconds for
+#: code that is as fast without
 _FLAGS = [
     *(["-O2"] if OLD else ["-O1", "-ftree-vectorize"]),
     "-march=native",
