@@ -41,7 +41,7 @@ def on_slurm():
     with slurm.private_slurm() as env, tempfile.TemporaryDirectory() as folder:
         env["PNEUNET"] = str(Path(sys.executable).with_name("pneunet"))
         done = [_study(env, Path(folder)), _solve(env, Path(folder))]
-        version = subprocess.check_output(["sbatch", "--version"], text=True).strip()
+        version = subprocess.check_output(["sbatch", "--version"], env=env, text=True).strip()
     return {"slurm_jobs_resumed_of_2": sum(done)}, {"version": version}
 
 

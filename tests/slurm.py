@@ -24,6 +24,7 @@ DAEMONS = ("munged", "slurmctld", "slurmd")
 PATH = os.pathsep.join([os.environ.get("PATH", os.defpath), "/usr/sbin"])
 #: slots that the one node offers, whatever it has
 SLOTS = 4
+CREDENTIALS_SECONDS = 3
 CONFIGURATION = """ClusterName=private
 SlurmctldHost={host}(127.0.0.1)
 SlurmctldPort={ports[0]}
@@ -31,7 +32,7 @@ SlurmdPort={ports[1]}
 AuthType=auth/munge
 CredType=cred/munge
 # a job that is put back into the queue waits until its credentials have expired
-AuthInfo=socket={folder}/munge.socket,cred_expire=3
+AuthInfo=socket={folder}/munge.socket,cred_expire={credentials}
 SlurmUser={user}
 SlurmdUser={user}
 StateSaveLocation={folder}/state
@@ -82,6 +83,7 @@ def _daemons(folder):
         user=subprocess.check_output(["id", "-un"], text=True).strip(),
         ports=_free_ports(2),
         slots=SLOTS,
+        credentials=CREDENTIALS_SECONDS,
     )
     (folder / "slurm.conf").write_text(configuration)
     env = {**os.environ, "PATH": PATH, "SLURM_CONF": str(folder / "slurm.conf")}
@@ -142,7 +144,8 @@ class Job:
         subprocess.run(["scancel", "--batch", "--signal=USR1", self.number], env=self.env, check=True)
         self.wait_for(lambda: "back into the queue" in self.log.read_text())
         self.wait_for(lambda: self.state() == "PENDING")
-        # SLURM holds it back for two minutes, whatever its configuration says
+        # SLURM holds it back for two minutes, whatever its configuration says; its credentials must expire
+        time.sleep(CREDENTIALS_SECONDS + 2)
         subprocess.run(
             ["scontrol", "update", f"JobId={self.number}", "StartTime=now"], env=self.env, check=True
         )
