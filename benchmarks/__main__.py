@@ -243,7 +243,7 @@ def snapshot():
     if "rod-fe" in meta:
         page = ROOT / "docs" / "theory-reduced.md"
         write_text(page, rod.page(page.read_text(), meta["rod-fe"]["details"]))
-    if {"contact", "contact-segment"} <= set(meta):
+    if "contact" in meta:
         page = ROOT / "docs" / "contact.md"
         write_text(page, contact_page.page(page.read_text(), results, meta))
     if "paper" in meta:
