@@ -107,8 +107,8 @@ def of_segment(segment):
     without, touching = segment["cpu_seconds_without_and_with"]
     return shown(
         f"The middle pitch of {segment['chambers']} pairs of chambers on {segment['ranks']} ranks"
-        f" ({segment['dofs']} dofs, same mesh). With contact it takes {touching / without:.2f} times the processor"
-        " time:",
+        f" ({segment['dofs']} dofs, same mesh). With contact it takes {touching / without:.2f} times as long"
+        " (processor time):",
         {"kPa": "g", "tau of the segment": ".2f", "tau of the cell": ".2f", "difference": "+.2%"},
         [
             [level["pressure_kPa"], twist, cell, twist / cell - 1]

@@ -192,6 +192,7 @@ def _heads(*texts):
 def page(meta, folder):
     """Lines of verification.md; its pictures go to `folder`."""
     d = meta["verification"]["details"]
+    d = d | {"elements": {name: d["elements"][name] for name in ELEMENTS}}  # which JSON has sorted
     _inflation_picture(d, folder / "verification-inflation.png")
     _convergence_picture(d, folder / "verification-convergence.png")
     made = "Made by `make bench ONLY=verification` and `python -m benchmarks --snapshot`"
