@@ -122,8 +122,8 @@ def study(name, folder):
     found = in_turns(runs)
     fine, finest = f"layers, {FINE:g} mm", f"layers, {LAYERED[-1]:g} mm"
     for size, case in layered.items():
-        row = found[f"layers, {size:g} mm"] = (sweep if size == FINE else free_path)(case, path)
-        print(f"  {name}, layers, {size:g} mm: {row}", flush=True)
+        told = found[f"layers, {size:g} mm"] = (sweep if size == FINE else free_path)(case, path)
+        print(f"  {name}, layers, {size:g} mm: {told}", flush=True)
     ratio = LAYERED[-2] / LAYERED[-1]
     three = [np.array(found[f"layers, {size:g} mm"]["strains_e_k_pitch"]) for size in LAYERED]
     # at a pressure that the finest does not reach from the two before

@@ -24,6 +24,7 @@ DAEMONS = ("munged", "slurmctld", "slurmd")
 PATH = os.pathsep.join([os.environ.get("PATH", os.defpath), "/usr/sbin"])
 #: slots that the one node offers, whatever it has
 SLOTS = 4
+#: after which a job's credentials expire
 CREDENTIALS_SECONDS = 3
 CONFIGURATION = """ClusterName=private
 SlurmctldHost={host}(127.0.0.1)

@@ -3,7 +3,7 @@
 import logging
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import dolfinx
@@ -56,21 +56,16 @@ def _with_locks(find, make):
     held = {}
 
     def find_locked(name, *rest):
-        lock, found = lock_module(name), (True, None)
-        try:
+        with ExitStack() as lock:
+            lock.callback(os.close, lock_module(name))
             found = find(name, *rest)
-        finally:
-            if found[0] is None:
-                held[name] = lock
-            else:
-                os.close(lock)
+            if found[0] is None:  # to be made
+                held[name] = lock.pop_all()
         return found
 
     def make_locked(declarations, objects, names, name, *rest, **more):
-        try:
+        with held.pop(name):
             return make(declarations, objects, names, name, *rest, **more)
-        finally:
-            os.close(held.pop(name))
 
     return find_locked, make_locked
 
