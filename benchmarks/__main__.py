@@ -16,6 +16,7 @@ from benchmarks import (
     cell,
     cell_grids,
     chain,
+    clamp,
     cluster,
     compare,
     contact,
@@ -102,6 +103,7 @@ PARTS = {
         rod.against_finite_elements,
         "rods with unit cells' laws against finite elements of three bodies; some 20 minutes",
     ),
+    "clamp": (clamp.clamp, "lengths that a clamp holds of rectangles, beside formulas; a minute"),
     "law": (
         law.law,
         (
@@ -243,9 +245,11 @@ def snapshot():
     if "law" in meta:
         page = ROOT / "docs" / "rod-law.md"
         write_text(page, law.page(page.read_text(), meta["law"]["details"], meta))
+    page = ROOT / "docs" / "theory-reduced.md"
     if "rod-fe" in meta:
-        page = ROOT / "docs" / "theory-reduced.md"
         write_text(page, rod.page(page.read_text(), meta["rod-fe"]["details"]))
+    if "clamp" in meta:
+        write_text(page, clamp.page(page.read_text(), meta["clamp"]["details"]))
     if "contact" in meta:
         page = ROOT / "docs" / "contact.md"
         write_text(page, contact_page.page(page.read_text(), results, meta))

@@ -16,6 +16,7 @@ from pneunet.base.materials.laws import NeoHookean
 from pneunet.base.units import GRAVITY
 from pneunet.geometry.loading import DeadLoads
 from pneunet.reduced import QuadraticLaw, Rod
+from pneunet.reduced.rod.clamp import stiffening
 from pneunet.reduced.rod.quadratic import beam_stiffness
 from pneunet.reduced.rod.rod import RodPiece
 
@@ -38,11 +39,14 @@ def euler_bernoulli(force: float) -> float:
 
 
 def rod_drop(force: float) -> float:
-    """Drop (mm) of the tip of a rod that bends, shears and stretches, at any size."""
+    """Drop (mm) of the tip of a rod that bends, shears and stretches, at any size, and whose clamp holds its
+    section."""
     half = SIDE / 2
-    stiffness = beam_stiffness([(half, -half, half, MU)], MU * SQUARE * SIDE**4)
-    law = QuadraticLaw([0.0], [[1.0, 0, 0, 0, 0, 0]], [stiffness])
-    rod = Rod([RodPiece(LENGTH, law, mass=DENSITY * SIDE**2)])
+    square, torsion = [(half, -half, half, MU)], MU * SQUARE * SIDE**4
+    stiffer = (stiffening(SIDE, SIDE, half), np.ones(6))  # within half a depth of the clamp
+    laws = [QuadraticLaw([0.0], [np.eye(6)[0]], [beam_stiffness(square, torsion, by)]) for by in stiffer]
+    lengths = half, LENGTH - half
+    rod = Rod([RodPiece(s, law, mass=DENSITY * SIDE**2) for s, law in zip(lengths, laws)])
     state = rod.equilibrium(DeadLoads((0.0, 0.0, -GRAVITY), (0.0, 0.0, -force)), tolerance=1e-5)
     return float(-state.tip[2, 3])
 

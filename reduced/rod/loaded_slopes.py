@@ -144,7 +144,7 @@ class _Balance:
             lengths, _ = free_pieces([segment], RodStrains.of_vector(np.eye(6)[:1]), [count])
             pieces = [replace(p, length=length) for p, length in zip(self.rod.pieces[3 * i :], lengths)]
         else:
-            pieces = rod_pieces([segment], [self.law], [P], [count])
+            pieces = rod_pieces([segment], [self.law], [P], [count], clamped=i == 0)
         wrenches, masses = np.empty((own.sum(), 6)), np.empty((own.sum(), 4))
         place = self.owner[own] - 3 * i
         for j, piece in enumerate(pieces):

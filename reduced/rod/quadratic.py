@@ -11,6 +11,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.strains import MIRROR, RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.geometry.parameters import Segment
+from pneunet.reduced.rod.clamp import stiffening
 from pneunet.reduced.rod.laws import SegmentLaw
 
 
@@ -105,12 +106,15 @@ class QuadraticLaw(SegmentLaw):
         return self._at(P)[1] + np.zeros((*np.shape(q)[:-1], 1, 1))
 
 
-def beam_stiffness(rectangles: Iterable[tuple[float, ...]], torsion: float) -> np.ndarray:
+def beam_stiffness(
+    rectangles: Iterable[tuple[float, ...]], torsion: float, stiffer: ArrayLike = 1.0
+) -> np.ndarray:
     """(6, 6) stiffness in (e, k) about the x axis of a section of rectangles (half width, z0, z1, signed
     shear modulus), mm and MPa.
 
     Incompressible (E = 3 mu); plane sections; shear area 5/6 and the shear centre at the centre of stiffness.
-    torsion: N mm2 about that centre.
+    torsion: N mm2 about that centre; stiffer (6,): factors of what the section has about it
+    (reduced.rod.clamp).
     """
     w, z0, z1, mu = (np.asarray(a, float) for a in zip(*rectangles))
     area = 2 * w * (z1 - z0)
@@ -121,12 +125,13 @@ def beam_stiffness(rectangles: Iterable[tuple[float, ...]], torsion: float) -> n
     own = np.diag([3 * shear, 5 / 6 * shear, 5 / 6 * shear, torsion, about_y, about_z])
     move = np.eye(6)  # strains of the line through the centre: e + k x (0, 0, centre)
     move[0, 4], move[1, 3] = centre, -centre
-    return move.T @ own @ move
+    return move.T @ (own * np.asarray(stiffer)) @ move
 
 
-def passive_law(segment: Segment, curvature: float = 0.0) -> QuadraticLaw:
+def passive_law(segment: Segment, curvature: float = 0.0, held: float | None = None) -> QuadraticLaw:
     """The QuadraticLaw of a segment's bare core with its channel: ends, plugs and joints, which the pressure
-    leaves unstrained; curvature: free curvature about z, 1/mm, all the same (reduced.rod.ends).
+    leaves unstrained; curvature: free curvature about z, 1/mm, all the same (reduced.rod.ends); held: length
+    (mm) of the piece, where a clamp holds an end of it.
 
     (Around a thin bore in an incompressible core, thrust on the cap and pressure on the wall cancel in the
     elongation.) Torsion is that of the full rectangle (Timoshenko & Goodier, Theory of Elasticity, Sec. 109)
@@ -148,4 +153,5 @@ def passive_law(segment: Segment, curvature: float = 0.0) -> QuadraticLaw:
         2 * w * (b - a) * np.sign(m) for w, a, b, m in rectangles[:2]
     )
     free = RodStrains([1.0, 0.0, 0.0], [0.0, 0.0, curvature])
-    return QuadraticLaw([0.0], [free.vector], [beam_stiffness(rectangles, mean * torsion)])
+    stiffer = np.ones(6) if held is None else stiffening(s.width, height, held)
+    return QuadraticLaw([0.0], [free.vector], [beam_stiffness(rectangles, mean * torsion, stiffer)])

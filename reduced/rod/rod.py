@@ -154,14 +154,16 @@ def rod_pieces(
     pressures: ArrayLike,
     counts: Sequence[float] | np.ndarray | None = None,
     end_effects: bool = True,
+    clamped: bool = True,
 ) -> list[RodPiece]:
     """The pieces, three of each, of n segments in a row with laws and pressures (MPa) of their own; counts
-    (n,): of chambers, real numbers, by default the segments' own; end_effects: as for Rod.of."""
+    (n,): of chambers, real numbers, by default the segments' own; end_effects: as for Rod.of; clamped:
+    whether the first one's base is."""
     pressures = np.broadcast_to(np.asarray(pressures, float), len(segments))
     cells = cell_strains(laws, segments, pressures)
     lengths, strains = free_pieces(segments, cells, counts, end_effects)
     pieces: list[RodPiece] = []
-    known: dict[tuple[Segment, int, float], SectionLaw] = {}
+    known: dict[tuple, SectionLaw] = {}
     for i, (length, q) in enumerate(zip(lengths.tolist(), strains.vector)):  # three of each segment
         segment, P = segments[i // 3], float(pressures[i // 3])
         turn = rotation(segment)
@@ -170,8 +172,9 @@ def rod_pieces(
             section: SectionLaw = _turned(laws[i // 3].of(segment), segment)
         else:
             (mass, z), P, bend = passive_mass(segment), 0.0, float(turn[:, 2] @ q[3:])
-            alike = segment.key, segment.roll, bend
-            section = known.setdefault(alike, _turned(passive_law(segment, bend), segment))
+            held = length if i == 0 and clamped else None
+            alike = segment.key, segment.roll, bend, held
+            section = known.setdefault(alike, _turned(passive_law(segment, bend, held), segment))
         y, z = (turn[1:, 2] * z).tolist()
         pieces.append(RodPiece(length, section, P, mass, (y, z), q))
     return pieces

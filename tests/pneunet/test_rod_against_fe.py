@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import clamp
 from pneunet.geometry import Manipulator
 from pneunet.geometry.cad.mesh import mesh_manipulator
 from pneunet.geometry.loading import DeadLoads
@@ -14,6 +15,7 @@ from pneunet.hifi.body.manipulator import ManipulatorSolve
 from pneunet.hifi.cell.file import CellCase
 from pneunet.hifi.cell.run import solve_cell
 from pneunet.reduced import QuadraticLaw, Rod
+from pneunet.reduced.rod.clamp import held_lengths
 
 MESH_SIZE, PRESSURE = 3.0, 0.01
 
@@ -48,3 +50,9 @@ def test_tips_agree_and_end_effects_are_why(finger, loads):
     modelled, without = (np.linalg.norm(rod.equilibrium(loads).tip[:3, 3] - tip) for rod in rods)
     assert moved > 0.05 * body.length
     assert modelled < 0.01 * body.length and modelled < 0.9 * without
+
+
+def test_a_clamp_holds_the_lengths_that_finite_elements_give():
+    """A bar twice as wide as high; its own height is 1 mm."""
+    told = held_lengths(2.0, 1.0)[list(clamp.AT)]
+    np.testing.assert_allclose(told, clamp.computed(2.0), atol=0.005)
