@@ -15,7 +15,7 @@ from benchmarks.tables import table
 
 ENERGY_INTERVALS = 16
 LAND_MESHES = ((8, 2, 2), (16, 2, 2), (24, 4, 4), (32, 4, 4), (48, 6, 6))
-COOK_MESHES = (4, 8, 16, 32)
+COOK_MESHES = (4, 8, 16, 32, 64)
 MANUFACTURED_MESHES = (2, 4, 8, 16)
 #: coarser meshes than those of the table, by half, for the order of what is exact
 HALVED = {"tube": 0.5, "flexure": (2, 8)}
@@ -153,7 +153,8 @@ that paper lie within 4.15 to 4.19 mm.""".splitlines()
 COOK = """\
 Plane strain, G = 80.1938 and K = 400942 MPa, 100 N per mm of thickness. Bricks are graded to the clamped
 end and the edges. The converged value is extrapolated from the last three meshes at the order that they
-show.""".splitlines()
+show. On hexahedra the rise first grows with the mesh, then falls, of order 1.4 at the clamped corners: that
+two coarse meshes agree is chance.""".splitlines()
 MANUFACTURED = """\
 Unit cube, isochoric finite shears, body force and the traction on one face derived by hand. The table has
 L2 errors, and orders from one mesh to the next (bars: 2.8 for u, 1.8 for p).""".splitlines()
