@@ -10,9 +10,12 @@ from benchmarks.tables import table
 
 KINDS = ("one_sided_w10", "twist_w12")
 PRESSURES = (0.02, 0.05)
-#: mm: the usual grid; tetrahedra that it is compared with; grids with layers at planes with re-entrant edges,
-#: whose last two are extrapolated from. The middle one is the fine grid of CELL.toml's `graded`
-DEFAULT, TETRAHEDRA, LAYERED, FINE = 1.5, 2.0, (4 / 3, 1.0, 0.75), 1.0
+#: mm: the usual grid; tetrahedra that it is compared with; CELL.toml's `graded`, with layers at planes with
+#: re-entrant edges
+DEFAULT, TETRAHEDRA, FINE = 1.5, 2.0, 1.0
+#: largest element and layers in mm of a grid, and into how many parts its elements are cut: two nested grids,
+#: whose strains are extrapolated
+NESTED, CUTS = (3.0, 0.6), (1, 2)
 #: of convergence at edges of 270 degrees: twice the exponent of their singularity
 ORDER = 2 * 0.5445
 #: whose walls touch, to what pressure in MPa, and its grids without layers in a constant ratio, mm
@@ -55,12 +58,19 @@ def row(seconds, strains, facts, stiffness):
     }
 
 
-def free_path(case, path):
-    """What `sweep` gives, of the free states alone, which ask for a fraction of the factorisations. Strains
-    are nan at a pressure that the grid does not reach."""
+def nested_cell(segment, cut, path):
+    """Write the part of a cell on NESTED that half turns make whole, its elements cut; its facts."""
+    from pneunet.geometry.cad.grid import grid_cell
+
+    size, layer = NESTED
+    return grid_cell(segment, size, path, layer, part=True, cut=cut)
+
+
+def free_path(segment, path, mesh):
+    """What `sweep` gives, of the free states alone, which ask for a fraction of the factorisations. mesh()
+    writes to `path`. Strains are nan at a pressure that the grid does not reach."""
     from pneunet.base.errors import ConvergenceError
     from pneunet.hifi.cell.problem import CellProblem
-    from pneunet.hifi.cell.run import mesh_of
     from pneunet.hifi.cell.system import RELATIVE_TOLERANCE, CellSystem
     from pneunet.hifi.path.control import LoadControl
     from pneunet.hifi.path.equilibrium import EquilibriumPath
@@ -68,8 +78,8 @@ def free_path(case, path):
     from pneunet.hifi.path.stepping import StepSize, run_steps
 
     started, seen = time.process_time(), {}
-    facts = mesh_of(case, path)
-    system = CellSystem(CellProblem(case.segment, path))
+    facts = mesh()
+    system = CellSystem(CellProblem(segment, path))
     options = NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)
     try:
         run_steps(
@@ -79,9 +89,9 @@ def free_path(case, path):
             lambda step: seen.update({step.load: system.state[-6:].copy()}),
         )
     except ConvergenceError as error:  # thin layers fold at re-entrant edges
-        print(f"  {case.segment.kind}, layers, {case.mesh_size:g} mm: {error}", flush=True)
+        print(f"  {segment.kind}, {facts['cells']} cells: {error}", flush=True)
     system.destroy()
-    strains = [vector(seen.get(p, np.full(6, np.nan)), case.segment.pitch) for p in PRESSURES]
+    strains = [vector(seen.get(p, np.full(6, np.nan)), segment.pitch) for p in PRESSURES]
     return row(time.process_time() - started, strains, facts, stiffness=False)
 
 
@@ -109,35 +119,31 @@ def in_turns(runs):
 
 def study(name, folder):
     """Rows of one segment without contact, {mesh: row}, and what they converge to."""
+    from pneunet.hifi.cell.run import mesh_of
+
     path = folder / "cell.npz"
     cases = {
         "tetrahedra": case_of(name, TETRAHEDRA, "tetrahedra"),
         "default": case_of(name, DEFAULT),
     }
-    layered = {size: case_of(name, size, graded=True) for size in LAYERED}
+    segment, fine = cases["default"].segment, case_of(name, FINE, graded=True)
     for element in ("tetrahedra", "hexahedra"):
         sweep(case_of(name, 4.0, element), path)  # compiles the forms
     runs = {mesh: lambda case=case: sweep(case, path) for mesh, case in cases.items()}
-    runs |= {f"{mesh}, free": lambda case=case: free_path(case, path) for mesh, case in cases.items()}
+    for mesh, case in cases.items():
+        runs[f"{mesh}, free"] = lambda case=case: free_path(segment, path, lambda: mesh_of(case, path))
     found = in_turns(runs)
-    fine, finest = f"layers, {FINE:g} mm", f"layers, {LAYERED[-1]:g} mm"
-    for size, case in layered.items():
-        told = found[f"layers, {size:g} mm"] = (sweep if size == FINE else free_path)(case, path)
-        print(f"  {name}, layers, {size:g} mm: {told}", flush=True)
-    ratio = LAYERED[-2] / LAYERED[-1]
-    three = [np.array(found[f"layers, {size:g} mm"]["strains_e_k_pitch"]) for size in LAYERED]
-    # at a pressure that the finest does not reach from the two before
-    limit = np.where(np.isnan(three[2]), extrapolated(*three[:2], ratio), extrapolated(*three[1:], ratio))
+    found["fine"] = sweep(fine, path)
+    print(f"  {name}, {FINE:g} mm: {found['fine']}", flush=True)
+    for cut in CUTS:
+        told = free_path(segment, path, lambda cut=cut: nested_cell(segment, cut, path))
+        found[f"nested, {cut}"] = told
+        print(f"  {name}, nested grid cut in {cut}: {told}", flush=True)
+    pair = [np.array(found[f"nested, {cut}"]["strains_e_k_pitch"]) for cut in CUTS]
+    limit = extrapolated(*pair, CUTS[1] / CUTS[0])
     for each in found.values():
         each["error_rel"] = errors_of(np.array(each["strains_e_k_pitch"]), limit).tolist()
-    return {
-        "case": name,
-        "meshes": found,
-        "fine": fine,
-        "finest": finest,
-        "extrapolated": limit.tolist(),
-        "orders": orders_of(*three, ratio).tolist(),
-    }
+    return {"case": name, "meshes": found, "extrapolated": limit.tolist()}
 
 
 def contact_cells():
@@ -172,23 +178,22 @@ def cells():
         studies = [study(kind, Path(name)) for kind in KINDS]
 
     def worst(mesh, what="error_rel"):
-        return float(max(np.nanmax(each["meshes"][each.get(mesh, mesh)][what]) for each in studies))
+        return float(max(np.nanmax(each["meshes"][mesh][what]) for each in studies))
 
     def ratio(of):
         seconds = [{mesh: row["cpu_seconds"] for mesh, row in each["meshes"].items()} for each in studies]
         return max(each[f"default{of}"] / each[f"tetrahedra{of}"] for each in seconds)
 
     def stretch_change(each):
-        default, fine = (np.array(each["meshes"][m]["largest_stretch"]) for m in ("default", each["fine"]))
+        default, fine = (np.array(each["meshes"][m]["largest_stretch"]) for m in ("default", "fine"))
         return np.abs(fine / default - 1).max()
 
     return {
         "cell_grid_error_rel": worst("default"),
         "cell_fine_grid_error_rel": worst("fine"),
-        "cell_finest_grid_error_rel": worst("finest"),
+        "cell_nested_grid_error_rel": worst(f"nested, {CUTS[-1]}"),
         "cell_tetrahedra_error_rel": worst("tetrahedra"),
         "stretch_mesh_rel": float(max(stretch_change(each) for each in studies)),
-        "cell_grid_order": float(np.nanmin([each["orders"] for each in studies])),
         "cell_default_vs_tets_ratio": ratio(""),
         "cell_default_vs_tets_free_ratio": ratio(", free"),
         "cell_fine_cpu_seconds": worst("fine", "cpu_seconds"),
@@ -197,12 +202,12 @@ def cells():
 
 
 ABOUT = f"""\
-Both kinds at 60 degrees on sheared grids of hexahedra, half a cell or a quarter, 0 to 50 kPa. *layers*: one
-element of a fifth of the largest on each side of planes with re-entrant edges. The limit is extrapolated from
-the last two grids with layers that reach a pressure, at order {ORDER:.2f}, which edges of 270 degrees allow;
-the observed order, of all three, stands below. Errors are norms of (e, k pitch) over the norm of the
-extrapolated strain. Processor seconds are of five levels with the stiffness at each, or of the free states
-alone.""".splitlines()
+Both kinds at 60 degrees on sheared grids of hexahedra, half a cell or a quarter, 0 to 50 kPa. *Layers*: one
+element of a fifth of the largest on each side of planes with re-entrant edges. *Nested*: a grid of
+{NESTED[0]:g} mm with layers of {NESTED[1]:g} mm, whose elements are cut in two along each axis. The limit is
+extrapolated from these two at order {ORDER:.2f}, which edges of 270 degrees allow. Errors are norms of
+(e, k pitch) over the norm of the extrapolated strain. Processor seconds are of five levels with the stiffness
+at each, or of the free states alone.""".splitlines()
 CONTACT = f"""\
 Unit cell {TOUCHING}, 60 degrees, at {1e3 * CONTACT_PRESSURE:g} kPa on hexahedra without layers: errors
 against the last two grids, extrapolated at order {ORDER:.2f}.""".splitlines()
@@ -212,18 +217,20 @@ def section(details):
     """Lines on `cell-grids` for docs/verification.md."""
     lines = ["## The unit cell on grids", "", *ABOUT, ""]
     names = {"tetrahedra": f"tetrahedra, {TETRAHEDRA:g} mm", "default": f"hexahedra, {DEFAULT:g} mm"}
+    names |= {"fine": f"layers, {FINE:g} mm"} | {
+        f"nested, {cut}": f"nested, {NESTED[0] / cut:g} mm" for cut in CUTS
+    }
     rows = []
     for each in details["studies"]:
         for mesh, r in each["meshes"].items():
             strains = [f"{r['strains_e_k_pitch'][1][i]:.4f}" for i in (0, 1, 3, 4)]
             errors = ["not reached" if np.isnan(error) else f"{error:.2%}" for error in r["error_rel"]]
             told = f"{r['cpu_seconds']:.1f}{', with stiffness' * r['stiffness']}"
-            name = mesh.removesuffix(", free")
-            rows.append([each["case"], names.get(name, name), r["cells"], *strains, *errors, told])
+            name = names[mesh.removesuffix(", free")]
+            rows.append([each["case"], name, r["cells"], *strains, *errors, told])
         limit = each["extrapolated"][1]
         strains = [f"{limit[i]:.4f}" for i in (0, 1, 3, 4)]
-        orders = [f"order {order:.2f}" for order in each["orders"]]
-        rows.append([each["case"], "extrapolated", "", *strains, *orders, ""])
+        rows.append([each["case"], "extrapolated", "", *strains, "", "", ""])
     head = ["case", "mesh", "cells", "e1", "e2", "k1 pitch", "k2 pitch", "error at 20 kPa", "at 50 kPa"]
     lines += table([*head, "processor s"], rows)
     return [*lines, "", "Strains at 50 kPa."]

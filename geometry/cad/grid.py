@@ -22,13 +22,14 @@ def grid_cell(
     gaps: bool = False,
     part: bool = False,
     like: Segment | None = None,
+    cut: int = 1,
 ) -> dict[str, Any]:
     """Write the mesh of geometry.grids.cell.cell_grid to `path`, an .npz, and beside it gmsh's .msh; returns
     {"body_mm3", "air_mm3", "cells", "part"}, volumes of the whole pitch. InputError when there would be too
     many elements."""
     sized = like or segment
     refuse_absurd(size, [(sized, sized.pitch, 1)])
-    mesh = cell_grid(segment, size, layer, gaps, part, like).mesh(air=True)
+    mesh = cell_grid(segment, size, layer, gaps, part, like, cut).mesh(air=True)
     volumes, copies = mesh.volumes(), 1 + part * len(HALF_TURNS[segment.kind])
     air, medium = mesh.cell_tags == tags.AIR, mesh.cell_tags == tags.GAP
     facts = {

@@ -28,6 +28,7 @@ def cell_grid(
     gaps: bool = False,
     part: bool = False,
     like: Segment | None = None,
+    cut: int = 1,
 ) -> TensorGrid:
     """The cell of `segment`, a chamber centred at xi = 0, with elements whose edges along x, y and z are at
     most `size` mm.
@@ -35,8 +36,9 @@ def cell_grid(
     layer (mm): one element of this thickness on each side of every plane in which stresses are singular.
     gaps: the room between the chambers is meshed too. part: only xi >= 0, and of a twisting cell only y >= 0:
     HALF_TURNS make the rest. like: a segment whose elements the grid has, as many between any two planes,
-    whatever size they come to here: a response on such grids is smooth in the design. InputError where the
-    planes of the two stand in another order.
+    whatever size they come to here: a response on such grids is smooth in the design. cut: into how many equal
+    parts along each axis elements are cut, for nested grids. InputError where the planes of the two stand in
+    another order.
     """
     refuse_fillets([segment], NO_CELL)
     s = snapped(segment)
@@ -53,6 +55,7 @@ def cell_grid(
                 "a grid like another cell's has planes in the order of those, which this cell's are not in:"
                 " leave out alike"
             )
+    xi, y, z = (_cut(places, cut) for places in (xi, y, z))
     if not part:
         xi = np.concatenate([-xi[:0:-1], xi])
     if part and twisting:
@@ -64,6 +67,11 @@ def cell_grid(
     if part and twisting:
         ends[1, -1] = None
     return TensorGrid(sheared(s, xi, y, z), kinds, ends)
+
+
+def _cut(places, parts):
+    """With as many equal parts between each two."""
+    return np.interp(np.arange((len(places) - 1) * parts + 1) / parts, np.arange(len(places)), places)
 
 
 def _apart(places):

@@ -114,6 +114,14 @@ def test_half_turns_map_a_cell_s_grid_onto_itself_and_its_part_makes_the_rest(na
 
 
 @pytest.mark.parametrize("name", KINDS)
+def test_a_grid_whose_elements_are_cut_is_nested(name):
+    segment = CASES[name](60.0, 1)
+    coarse, fine = (cell_grid(segment, 4.0, 0.8, part=True, cut=cut) for cut in (1, 3))
+    np.testing.assert_allclose(fine.points[::3, ::3, ::3], coarse.points, atol=1e-12)
+    assert (fine.kinds[1::3, 1::3, 1::3] == coarse.kinds).all()
+
+
+@pytest.mark.parametrize("name", KINDS)
 def test_opposite_cuts_of_a_cell_are_images_of_each_other(name):
     segment = CASES[name](60.0, 1)
     points = cell_grid(segment, 1.5).points
