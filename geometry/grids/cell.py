@@ -36,9 +36,9 @@ def cell_grid(
     layer (mm): one element of this thickness on each side of every plane in which stresses are singular.
     gaps: the room between the chambers is meshed too. part: only xi >= 0, and of a twisting cell only y >= 0:
     HALF_TURNS make the rest. like: a segment whose elements the grid has, as many between any two planes,
-    whatever size they come to here: a response on such grids is smooth in the design. cut: into how many equal
-    parts along each axis elements are cut, for nested grids. InputError where the planes of the two stand in
-    another order.
+    whatever size they come to here: a response on such grids is smooth in the design. InputError where the
+    planes of the two stand in another order. cut: into how many equal parts along each axis elements are cut;
+    grids of several are nested.
     """
     refuse_fillets([segment], NO_CELL)
     s = snapped(segment)
