@@ -216,9 +216,9 @@ Both kinds at 60 degrees on sheared grids of hexahedra, half a cell or a quarter
 element of a fifth of the largest on each side of planes with re-entrant edges. *Cut*: all room between two
 planes of the cell in so many equal parts, which makes nested grids. The limit is extrapolated from the last
 two of these at order {ORDER:.2f}, the least that edges of 270 degrees allow; the observed order of the three
-stands below. Where that is higher, errors are told too large. Errors are norms of (e, k pitch) over the norm of
-the extrapolated strain. Processor seconds are of five levels with the stiffness at each, or of the free states
-alone.""".splitlines()
+stands below. Where that is higher, errors are told too large. Errors are norms of (e, k pitch) over the norm
+of the extrapolated strain. Processor seconds are of five levels with the stiffness at each, or of the free
+states alone.""".splitlines()
 CONTACT = f"""\
 Unit cell {TOUCHING}, 60 degrees, at {1e3 * CONTACT_PRESSURE:g} kPa, where walls hold each other: the usual
 grid, and all room between two planes of the cell in so many equal parts; errors against the last two of
