@@ -14,7 +14,8 @@ AT = (0, 3, 4, 5)
 
 
 def computed(width, counts=(16, 6, 6)):
-    """(4,) held lengths (mm) of NAMES of a bar of HEIGHT in counts of hexahedra, small at clamp and edges.
+    """(4,) held lengths (mm) of NAMES of a bar of HEIGHT in counts of hexahedra, small at clamp and edges,
+    along it a multiple of 16.
 
     Far from both ends a turn or a shift grows with x as that of a rod which yields from the held length on.
     """

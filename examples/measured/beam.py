@@ -43,8 +43,10 @@ def rod_drop(force: float) -> float:
     section."""
     half = SIDE / 2
     square, torsion = [(half, -half, half, MU)], MU * SQUARE * SIDE**4
-    stiffer = (stiffening(SIDE, SIDE, half), np.ones(6))  # within half a depth of the clamp
-    laws = [QuadraticLaw([0.0], [np.eye(6)[0]], [beam_stiffness(square, torsion, by)]) for by in stiffer]
+    laws = [
+        QuadraticLaw([0.0], [np.eye(6)[0]], [beam_stiffness(square, torsion, stiffening(SIDE, SIDE, near))])
+        for near in (half, np.inf)  # within half a depth of the clamp, and beyond
+    ]
     lengths = half, LENGTH - half
     rod = Rod([RodPiece(s, law, mass=DENSITY * SIDE**2) for s, law in zip(lengths, laws)])
     state = rod.equilibrium(DeadLoads((0.0, 0.0, -GRAVITY), (0.0, 0.0, -force)), tolerance=1e-5)

@@ -28,7 +28,7 @@ def grid_cell(
     {"body_mm3", "air_mm3", "cells", "part"}, volumes of the whole pitch. InputError when there would be too
     many elements."""
     sized = like or segment
-    refuse_absurd(size, [(sized, sized.pitch, 1)])
+    refuse_absurd(size / cut, [(sized, sized.pitch, 1)])
     mesh = cell_grid(segment, size, layer, gaps, part, like, cut).mesh(air=True)
     volumes, copies = mesh.volumes(), 1 + part * len(HALF_TURNS[segment.kind])
     air, medium = mesh.cell_tags == tags.AIR, mesh.cell_tags == tags.GAP

@@ -32,5 +32,6 @@ def held_lengths(width: float, height: float) -> np.ndarray:
 
 
 def stiffening(width: float, height: float, length: float) -> np.ndarray:
-    """(6,) by how much a piece of `length` mm behind a clamp is stiffer than its section."""
+    """(6,) factors by which a piece of `length` mm (or infinite) behind a clamp is stiffer in (e, k) than its
+    section; sides in mm."""
     return 1 / (1 - np.minimum(held_lengths(width, height) / length, LARGEST_SHARE))

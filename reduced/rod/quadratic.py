@@ -128,10 +128,10 @@ def beam_stiffness(
     return move.T @ (own * np.asarray(stiffer)) @ move
 
 
-def passive_law(segment: Segment, curvature: float = 0.0, held: float | None = None) -> QuadraticLaw:
+def passive_law(segment: Segment, curvature: float = 0.0, clamped: float = np.inf) -> QuadraticLaw:
     """The QuadraticLaw of a segment's bare core with its channel: ends, plugs and joints, which the pressure
-    leaves unstrained; curvature: free curvature about z, 1/mm, all the same (reduced.rod.ends); held: length
-    (mm) of the piece, where a clamp holds an end of it.
+    leaves unstrained; curvature: free curvature about z, 1/mm, all the same (reduced.rod.ends); clamped:
+    length (mm) of a piece behind a clamp, infinite without one.
 
     (Around a thin bore in an incompressible core, thrust on the cap and pressure on the wall cancel in the
     elongation.) Torsion is that of the full rectangle (Timoshenko & Goodier, Theory of Elasticity, Sec. 109)
@@ -153,5 +153,5 @@ def passive_law(segment: Segment, curvature: float = 0.0, held: float | None = N
         2 * w * (b - a) * np.sign(m) for w, a, b, m in rectangles[:2]
     )
     free = RodStrains([1.0, 0.0, 0.0], [0.0, 0.0, curvature])
-    stiffer = np.ones(6) if held is None else stiffening(s.width, height, held)
-    return QuadraticLaw([0.0], [free.vector], [beam_stiffness(rectangles, mean * torsion, stiffer)])
+    stiffness = beam_stiffness(rectangles, mean * torsion, stiffening(s.width, height, clamped))
+    return QuadraticLaw([0.0], [free.vector], [stiffness])

@@ -172,9 +172,9 @@ def rod_pieces(
             section: SectionLaw = _turned(laws[i // 3].of(segment), segment)
         else:
             (mass, z), P, bend = passive_mass(segment), 0.0, float(turn[:, 2] @ q[3:])
-            held = length if i == 0 and clamped else None
-            alike = segment.key, segment.roll, bend, held
-            section = known.setdefault(alike, _turned(passive_law(segment, bend, held), segment))
+            behind_clamp = length if i == 0 and clamped else np.inf
+            alike = segment.key, segment.roll, bend, behind_clamp
+            section = known.setdefault(alike, _turned(passive_law(segment, bend, behind_clamp), segment))
         y, z = (turn[1:, 2] * z).tolist()
         pieces.append(RodPiece(length, section, P, mass, (y, z), q))
     return pieces

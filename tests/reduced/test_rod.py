@@ -13,10 +13,9 @@ from pneunet.base.strains import MIRROR
 from pneunet.geometry import Manipulator
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.reference_cases import CASES
-from pneunet.reduced.rod.clamp import held_lengths, stiffening
 from pneunet.reduced.rod.equilibrium import Grid
 from pneunet.reduced.rod.quadratic import QuadraticLaw, passive_law
-from pneunet.reduced.rod.rod import Rod, RodPiece, rod_pieces
+from pneunet.reduced.rod.rod import Rod, RodPiece
 from tests.reduced.rod_energy import energy, gradient, hessian
 
 REST = np.eye(6)[0]
@@ -398,19 +397,3 @@ def test_passive_core_is_a_beam_about_its_own_centre():
     assert K[0, 0] == pytest.approx(46.0) and K[0, 4] == pytest.approx(50 * -0.5)
     assert K[4, 4] == pytest.approx(10 * 125 / 12 + 50 * 0.25 - 2 * 8 / 12)
     assert K[5, 5] == pytest.approx(5 * 1000 / 12 - 2 * 8 / 12)
-
-
-def test_a_clamp_takes_the_compliance_of_the_held_lengths():
-    segment = CASES["twist_w12"](angle=90.0, chambers=2).plain(40.0)
-    height = segment.core_top - segment.core_bottom
-    held, K = held_lengths(segment.width, height), passive_law(segment).stiffnesses[0]
-    rod = Rod(rod_pieces([segment], [law()], 0.0))
-    for i, moment in enumerate(1e-3 * np.eye(3), start=3):
-        tip = rod.equilibrium(DeadLoads(tip_moment=tuple(moment)), tolerance=1e-8).tip
-        turn = se3.log_rotation(tip[:3, :3])[i - 3]
-        assert turn * K[i, i] / 1e-3 == pytest.approx(40.0 - held[i], rel=1e-4)
-
-
-def test_a_clamp_holds_no_more_than_its_piece():
-    assert stiffening(12.0, 5.0, 0.1)[3:] == pytest.approx([10.0] * 3)
-    assert stiffening(12.0, 5.0, 1e6) == pytest.approx([1.0] * 6, abs=1e-5)
