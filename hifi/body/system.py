@@ -7,12 +7,12 @@ import numpy as np
 from mpi4py import MPI
 
 from pneunet.hifi.body.problem import BodyProblem
+from pneunet.hifi.contact.correction import ContactCorrection
 from pneunet.hifi.fem.solver import DirectSolver
-from pneunet.hifi.path.low_rank import ContactUpdate
 from pneunet.hifi.path.rod_coordinates import RodCoordinates
 
-#: changes of touch above which a tangent is factorised anew
-MOST_TOUCHES = 60
+#: points of walls whose columns cost as much as a tangent that is factorised anew
+MOST_TOUCHES = 200
 
 
 class BodySystem:
@@ -76,30 +76,33 @@ class BodySystem:
         self.problem.assemble_tangent(self._matrix)
         self.solver.factorise()
         self._rotation_then = self._rotations()
-        touching = self.problem.contact.stiffnesses(factorised=True)
-        self._update = ContactUpdate(touching, MOST_TOUCHES, self.comm.allreduce)
+        touching = self.problem.contact.points(factorised=True)
+        self._contact = ContactCorrection(touching, MOST_TOUCHES, self.comm.allreduce)
+        self.renew()
 
     @property
     def overreach(self) -> float:
         return self.problem.contact.overreach
 
     def renew(self) -> bool | None:
-        """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
+        """Take which walls touch now: see ContactCorrection.renew."""
         contact = self.problem.contact
-        return self._update.renew(contact.stiffnesses(), contact.gradients, self._solve_columns)
-
-    def _solve_columns(self, right):
-        return np.column_stack([self._solve(column) for column in right.T])
+        return self._contact.renew(contact.points(), contact.gradients, self._solve)
 
     def _rotations(self):
         return self.coordinates.sections(self.coordinates.nodes + self.problem.displacement())[:, :3, :3]
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """(owned dofs,) approximation of K^-1 right at the current state, K as it was renewed."""
-        return self._update.corrected(self._solve(right))
+        """(owned dofs,) approximation of K^-1 right at the current state, K with what touches now."""
+        return self._contact.corrected(self._solve(right), np.sqrt(self.dot(right, right)), straight=True)
+
+    def correction(self, residual: np.ndarray) -> np.ndarray:
+        """(owned dofs,): what brings the residual to zero, walls that come into touch or part by it
+        included."""
+        return self._contact.corrected(-self._solve(residual), np.sqrt(self.dot(residual, residual)))
 
     def _solve(self, right):
-        """(owned dofs,) approximation of K^-1 right with the factorised tangent.
+        """(owned dofs, ...) approximation of K^-1 right with the factorised tangent.
 
         The factorised tangent is turned with the body: a rigidly rotated part has the tangent R K R^T, so a
         lagged one serves as long as the *strains* have not changed much, whatever the sections' rotations.
@@ -107,9 +110,9 @@ class BodySystem:
         dofs = self._owned_displacements
         turn = np.einsum("nij,nkj->nik", self._rotations(), self._rotation_then)[: len(dofs)]
         turned = right.copy()
-        turned[dofs] = np.einsum("nji,nj->ni", turn, right[dofs])
-        solution = self.solver.solve(turned)
-        solution[dofs] = np.einsum("nij,nj->ni", turn, solution[dofs])
+        turned[dofs] = np.einsum("nji,nj...->ni...", turn, right[dofs])
+        solution = (self.solver.solve if right.ndim == 1 else self.solver.solve_many)(turned)
+        solution[dofs] = np.einsum("nij,nj...->ni...", turn, solution[dofs])
         return solution
 
     @property

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from pneunet.base.strains import RodStrains
 from pneunet.hifi.cell.problem import CellProblem
+from pneunet.hifi.contact.correction import ContactCorrection
 from pneunet.hifi.fem.solver import DirectSolver
-from pneunet.hifi.path.low_rank import ContactUpdate
 
 #: of the gap: an overlap at which contact has failed
 TOO_DEEP = 0.05
@@ -180,22 +181,28 @@ class CellSystem:
         self._mixed *= self.problem.classes[0].strains
         self.influence = self._solver.solve_many(self._mixed)
         self.condensed = self._curvature - self._mixed.T @ self.influence
-        self._update = ContactUpdate(self.problem.contact.stiffnesses(factorised=True))
+        self._contact = ContactCorrection(self.problem.contact.points(factorised=True))
+        self.renew()
 
     def renew(self) -> bool | None:
-        """Bring the factorised tangent up to date with which walls touch: see ContactUpdate.renew."""
-        return self._update.renew(self.problem.contact.stiffnesses(), self._gap_gradients, self._solve)
+        """Take which walls touch now: see ContactCorrection.renew."""
+        return self._contact.renew(self.problem.contact.points(), self._gap_gradients, self._solve)
 
-    def _gap_gradients(self, points):
-        rows, n = self.problem.contact.gradients(points), self.problem.unknowns
-        return np.hstack(
-            [rows[:, :n], np.zeros((len(rows), self._inner - n)), rows[:, n:][:, self._free] / self.pitch]
-        )
+    def _gap_gradients(self, names):
+        rows, n = self.problem.contact.gradients(names), self.problem.unknowns
+        multipliers = sp.csr_matrix((len(names), self._inner - n))
+        return sp.hstack([rows[:, :n], multipliers, rows[:, n:][:, self._free] / self.pitch], format="csr")
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent as it was
-        renewed."""
-        return self._update.corrected(self._solve(right[:, None])[:, 0])
+        """K^-1 right in (unknowns, multipliers, free strains times pitch), K the factorised tangent with what
+        touches now."""
+        return self._contact.corrected(
+            self._solve(right[:, None])[:, 0], np.linalg.norm(right), straight=True
+        )
+
+    def correction(self, residual: np.ndarray) -> np.ndarray:
+        """What brings the residual to zero, walls that come into touch or part by it included."""
+        return self._contact.corrected(-self._solve(residual[:, None])[:, 0], np.linalg.norm(residual))
 
     def solve_inner(self, right: np.ndarray) -> np.ndarray:
         """Inverse of the factorised tangent at held strains times right (unknowns and multipliers, n)."""

@@ -41,13 +41,13 @@ class BodyContact(Contact):
     def _all(self, rows):
         return np.concatenate(self.comm.allgather(rows))
 
-    def sides(self) -> list[Side]:
+    def sides(self, reach: float = 0.0) -> list[Side]:
         x = self._all((self.problem.nodes + self.problem.displacement())[self._facets])
         found = []
         for number, own, other in self._mine:
             law, direction = self._laws[number // 2], mean_normal(x[own]) - mean_normal(x[other])
             direction /= np.linalg.norm(direction)
-            t = touching(x[own], self._areas[own], x[other], direction, law)
+            t = touching(x[own], self._areas[own], x[other], direction, law, reach=reach * law.gap)
             if t is not None:
                 dofs = np.hstack([self._dofs[own[t.facet]], self._dofs[other[t.other]]])
                 found.append(Side(number, law, t, dofs, self._size))

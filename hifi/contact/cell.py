@@ -19,6 +19,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from pneunet.base.left_jacobian import LeftJacobian
+from pneunet.hifi.contact.correction import Name
 from pneunet.hifi.contact.gaps import Contact, Side
 from pneunet.hifi.contact.penalty import WallPenalty, mean_normal, touching
 from pneunet.hifi.contact.walls import IN_CONTACT, CellWalls, WallContact, distances_from
@@ -70,13 +71,15 @@ class CellContact(Contact):
         values = np.append(signs, each.strains[_ORDER])[rows]
         return sp.coo_matrix((values, (rows, columns[rows])), (self._size, each.unknowns + 6)).tocsr()
 
-    def sides(self) -> list[Side]:
+    def sides(self, reach: float = 0.0) -> list[Side]:
         problem, found = self.problem, []
         y = problem.nodes[self._nodes] * [0, 1, 1] + problem.displacement()[self._nodes]
         screw = _Screw(problem.strains.value, self._stations, self._standing, y * self._turns)
         x = screw.positions
         for number, (own, other, areas, direction) in enumerate(self._pairs):
-            t = touching(x[own], areas, x[other], direction, self._law, len(problem.turns) / 2)
+            t = touching(
+                x[own], areas, x[other], direction, self._law, len(problem.turns) / 2, reach * self._law.gap
+            )
             if t is not None:
                 nodes = np.concatenate([own[t.facet], other[t.other]], axis=1)
                 found.append(_Side(number, self._law, t, nodes, screw, x[other]))
@@ -94,8 +97,8 @@ class CellContact(Contact):
         signs = self._signs[number]
         return (signs.T @ self._stiffness @ signs).tocsr()
 
-    def gradients(self, points: list) -> np.ndarray:
-        return super().gradients(points) @ self._signs[0]
+    def gradients(self, names: list[Name]) -> sp.csr_matrix:
+        return super().gradients(names) @ self._signs[0]
 
     def forces(self) -> np.ndarray:
         # of the rotations those that keep a gap; they exchange its walls with the direction of the axis

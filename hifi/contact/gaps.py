@@ -4,14 +4,17 @@ What bodies and cells have in common. Where their walls are, and how these move 
 themselves (hifi.contact.body, hifi.contact.cell).
 """
 
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from pneunet.hifi.contact.correction import Name, WallPoints
 from pneunet.hifi.contact.penalty import DEEPEST, PenaltyLaw, Touching
-from pneunet.hifi.path.low_rank import Stiffnesses
+
+#: of the gap: points that are nearer are looked at, since a correction may bring them into touch
+REACH = 0.3
 
 
 class Side:
@@ -23,9 +26,10 @@ class Side:
 
     def __init__(self, number: int, law: PenaltyLaw, touching: Touching, columns: np.ndarray, size: int):
         self.number, self.touching, self._columns, self._size = number, touching, columns, size
+        self._law = law
         self._kept = columns >= 0
         #: deepest overlap over the gap at rest, above 0 from where the pressure begins
-        self.depth = (touching.overlap.max() + law.onset) / law.gap
+        self.depth = max(touching.overlap.max() + law.onset, 0.0) / law.gap
 
     @property
     def resultant(self) -> np.ndarray:
@@ -33,11 +37,12 @@ class Side:
         t = self.touching
         return (-1) ** self.number * (t.area * t.pressure) @ t.normal
 
-    @property
-    def stiffnesses(self) -> Stiffnesses:
-        """{point: N/mm}, in the order of the points."""
-        t = self.touching
-        return {(self.number, *name): k for name, k in zip(t.name.tolist(), t.area * t.slope)}
+    @cached_property
+    def points(self) -> WallPoints:
+        """All of them."""
+        t, one = self.touching, np.ones(len(self.touching.area))
+        names = [(self.number, *name) for name in t.name.tolist()]
+        return WallPoints(names, t.area, t.overlap, self._law.stiffness * one, self._law.onset * one)
 
     def rows(self, values: np.ndarray, places: np.ndarray, count: int) -> sp.csr_matrix:
         """Sparse (count, size) of derivatives by the nodes' positions, values (pairs, k, 3) in rows
@@ -80,14 +85,14 @@ class Contact:
 
     def __init__(self, comm: MPI.Comm, size: int, owned: slice):
         self.comm, self._size, self._owned = comm, size, owned
-        #: sides that push at the last residual, and at the last tangent
+        #: sides within REACH at the last residual, and those that push at the last tangent
         self._now, self._then = [], []
         #: deepest overlap at the last residual, over DEEPEST of the gap; 0 where nothing comes closer than
         #: the penalty's onset (hifi.path.newton)
         self.overreach = 0.0
 
-    def sides(self) -> list[Side]:
-        """What pushes now in the gaps that this rank computes."""
+    def sides(self, reach: float = 0.0) -> list[Side]:
+        """What pushes now, or is within `reach` of the gap of that, in the gaps that this rank computes."""
         return []
 
     def energy(self) -> float:
@@ -97,7 +102,7 @@ class Contact:
 
     def residual(self) -> np.ndarray:
         """(owned,) how the energy changes with the unknowns."""
-        self._now = self.sides()
+        self._now = self.sides(REACH)
         deepest = self.comm.allreduce(max((side.depth for side in self._now), default=0.0), op=MPI.MAX)
         self.overreach = deepest / DEEPEST
         own, total = sum((side.forces() for side in self._now), np.zeros(self._size)), np.zeros(self._size)
@@ -107,27 +112,27 @@ class Contact:
 
     def tangent(self) -> sp.csr_matrix:
         """Sparse (owned, size): second derivatives of the energy."""
-        self._then = self.sides()
+        self._then, self._now = self.sides(), self.sides(REACH)
         own = sum((side.tangent() for side in self._then), sp.csr_matrix((self._size, self._size)))
         return sum(self.comm.allgather(own))[self._owned]
 
-    def stiffnesses(self, factorised: bool = False) -> Stiffnesses:
-        """{point: N/mm} of all ranks, at the last residual or at the last tangent."""
+    def points(self, factorised: bool = False) -> WallPoints:
+        """Of all ranks: those that touch or nearly do now, or those that pushed at the last tangent."""
         sides = self._then if factorised else self._now
-        parts = self.comm.allgather([side.stiffnesses for side in sides])
-        return {point: value for part in parts for side in part for point, value in side.items()}
+        parts = self.comm.allgather([side.points for side in sides])
+        return reduce(WallPoints.joined, [points for part in parts for points in part], WallPoints())
 
-    def gradients(self, points: list) -> np.ndarray:
-        """(m, owned): how the gaps of points change; zero for those that push at no side."""
-        places, rows = {p: i for i, p in enumerate(points)}, {}
-        for side in [*self._now, *self._then]:  # what is taken away was put in as it was then
-            chosen = [(places[p], row) for row, p in enumerate(side.stiffnesses) if p in places]
-            if chosen:
-                to, of = np.array(chosen).T
-                rows |= dict(zip(to.tolist(), side.gap_gradients[of]))
-        nothing = sp.csr_matrix((1, self._size))
-        own = sp.vstack([rows.get(i, nothing) for i in range(len(points))]).tocsr()
-        return sum(self.comm.allgather(own))[:, self._owned].toarray()
+    def gradients(self, names: list[Name]) -> sp.csr_matrix:
+        """Sparse (m, owned): how the gaps of points change; of points that are far apart now, as at the last
+        tangent."""
+        left, own = {name: i for i, name in enumerate(names)}, sp.csr_matrix((len(names), self._size))
+        for side in [*self._now, *self._then]:
+            found = [(left.pop(name), row) for row, name in enumerate(side.points.names) if name in left]
+            if found:
+                to, of = np.array(found).T
+                places = sp.coo_matrix((np.ones(len(to)), (to, of)), (len(names), len(side.points.names)))
+                own = own + places.tocsr() @ side.gap_gradients
+        return sum(self.comm.allgather(own)).tocsr()[:, self._owned]
 
     def forces(self) -> np.ndarray:
         """(gaps, 3) N at the last residual: of each gap's first wall on the second."""

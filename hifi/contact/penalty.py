@@ -127,10 +127,11 @@ def touching(
     direction: np.ndarray,
     law: PenaltyLaw,
     share: float = 0.5,
+    reach: float = 0.0,
 ) -> Touching | None:
     """The Touching of the Gauss points of facets `points` (n, nodes, 3) in mm, undeformed areas (n, p) of
     these points in mm2, on the `wall` (m, nodes, 3) that lies in `direction` (3,); None where nothing comes
-    closer than the law's onset. share: of the contact that this side carries."""
+    closer than the law's onset and `reach` (mm). share: of the contact that this side carries."""
     if not len(points) or not len(wall) or not (np.isfinite(points).all() and np.isfinite(wall).all()):
         return None  # a state that has diverged has a residual that says so
     kind, heights = kind_of(wall), wall @ direction
@@ -138,7 +139,7 @@ def touching(
     x = np.einsum("qn,fni->fqi", shape, points)
     above = x @ direction
     low = (heights.min(axis=1) - _BULGE * np.ptp(heights, axis=1)).min()
-    facet, gauss = np.nonzero(above > low - law.onset)
+    facet, gauss = np.nonzero(above > low - law.onset - reach)
     if not len(facet):
         return None
     plane = np.linalg.svd(direction[None])[2][1:]
@@ -153,7 +154,7 @@ def touching(
     share_of = np.where(facing, share_of, 0.0)
     total = np.bincount(point, share_of, len(facet))
     mean = np.bincount(point, share_of * gap, len(facet)) / np.maximum(total, 1e-300)
-    near = (total > 0) & (mean < law.onset)
+    near = (total > 0) & (mean < law.onset + reach)
     keep = np.flatnonzero(near[point] & (share_of > 0))
     if not len(keep):
         return None

@@ -77,8 +77,9 @@ class DirectSolver:
         return self._solution.array.copy()
 
     def solve_many(self, right: np.ndarray) -> np.ndarray:
-        """K^-1 right, (rows, columns) arrays on one rank: all columns in one pass through the factors."""
-        b = PETSc.Mat().createDense(right.shape, array=right.copy(order="F"), comm=PETSc.COMM_SELF)
+        """K^-1 right, (owned rows, columns) arrays: all columns in one pass through the factors."""
+        rows, columns = self.matrix.getSizes()[0], (None, right.shape[1])
+        b = PETSc.Mat().createDense((rows, columns), array=right.copy(order="F"), comm=self.comm)
         x = b.duplicate()
         self.ksp.getPC().getFactorMatrix().matSolve(b, x)
         solution = x.getDenseArray().copy()

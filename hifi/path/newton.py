@@ -5,9 +5,8 @@ quasi-Newton of type II, Fang & Saad, Numer. Linear Algebra Appl. 16, 2009): the
 increments explain is removed before the lagged tangent sees the rest. One solve and one residual an
 iteration. On slender bodies a lagged tangent is no help once walls have bulged, however small the step. What
 it makes worse is taken back, which costs a solve, and the tangent is factorised where the correction started:
-steps can be many times longer. Where walls touch, each change of what touches renews the tangent (an
-active-set iteration), and corrections that drive walls far into each other, unseen by a tangent that knew of
-no contact there, are shortened.
+steps can be many times longer. Where walls touch, corrections follow the contact law (System.correction),
+and are shortened where they drive walls far into each other, or go further than forces do work along them.
 """
 
 from collections.abc import Callable
@@ -28,6 +27,11 @@ TANGENT_GAIN, UPDATE_GAIN = 0.2, 0.5
 #: tangents factorised for one step, after which it should have come closer: beyond a limit point there is
 #: nothing to come to
 MOST_TANGENTS = 6
+#: those where walls touch and the residual has grown: a smaller step is cheaper
+MOST_TOUCHING = 2
+#: of the work that forces do along a correction at its start: what they may still do at its end; residuals
+#: for that
+STILL, SEARCHES = 0.3, 6
 
 
 @dataclass
@@ -97,13 +101,14 @@ class Newton:
                 return NewtonResult(iteration, history)
             renewed = self.current and not due and self.timed("renew", system.renew)
             if not self.current or due or renewed is None or iterations_left(since, tolerance) > o.patience:
+                factorised += 1
+                worse = system.overreach > 0 and norm > max(history[:2])
+                if factorised > (MOST_TOUCHING if worse else MOST_TANGENTS) and norm > 0.1 * history[0]:
+                    raise NotConverged(
+                        f"residual {norm:.1e} N after {factorised - 1} tangents, none of which helps"
+                    )
                 self.factorise()
                 renewed, fresh = True, True
-                factorised += 1
-                if factorised > MOST_TANGENTS and norm > 0.1 * history[0]:
-                    raise NotConverged(
-                        f"residual {norm:.1e} N after {factorised} tangents, none of which helps"
-                    )
             if renewed:
                 secants.forget()
                 since = []
@@ -122,8 +127,13 @@ class Newton:
                 step, load_step = fraction * step, fraction * load_step
                 system.state, system.load = system.moved(state, step), load + load_step
                 new, new_norm, new_scale = self.residual()
+            shorter = None
+            if system.overreach > 0 and load_step == 0 and not new_norm < UPDATE_GAIN * norm:
+                shorter = self._shortened(state, step, r, new)
+            if shorter:
+                step, new, new_norm, new_scale = shorter
             history.append(new_norm)
-            if not fresh and not new_norm < norm:
+            if not fresh and not shorter and not new_norm < norm:
                 # worse by a lagged tangent: take the correction back and factorise where it started
                 system.state, system.load, self.current = state, load, False
                 continue
@@ -142,11 +152,34 @@ class Newton:
             f"residual {norm:.1e} N after {o.maximum_iterations} iterations (tolerance {tolerance:.1e} N)"
         )
 
+    def _shortened(self, state, step, r, new):
+        """(step, residual, its norm, the norm of what it balances) of that part of a correction from `state`
+        at whose end forces do no more work along it, nearly, by regula falsi; None where the whole does not
+        go further than that. r, new: residuals at its ends. (Matthies & Strang, Int. J. Numer. Methods Eng.
+        14, 1979.)"""
+        system = self.system
+        low, high = (0.0, system.dot(step, r)), (1.0, system.dot(step, new))
+        enough = STILL * abs(low[1])
+        if abs(high[1]) < enough or low[1] * high[1] > 0:
+            return None
+        for _ in range(SEARCHES):
+            (s, a), (t, b) = low, high
+            part = s + (t - s) * min(max(a / (a - b), 0.1), 0.9)
+            system.state = system.moved(state, part * step)
+            found, norm, scale = self.residual()
+            work = system.dot(step, found) if np.isfinite(norm) else -a
+            if abs(work) < enough:
+                break
+            if work * a > 0:
+                low, high = (part, work), (t, b / 2)
+            else:
+                low, high = (s, a / 2), (part, work)
+        return part * step, found, norm, scale
+
     def _correction(self, r, parameter, secants):
         """(increment, load increment) of one iteration."""
         rest, known, known_load = secants.explain(r)
-        z = self.system.solve(rest)
-        step, load_step = -z - known, -known_load
+        step, load_step = self.system.correction(rest) - known, -known_load
         return self.control.close(self.system, parameter, step, load_step)
 
 

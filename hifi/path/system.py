@@ -28,10 +28,14 @@ class System(Protocol):
         """Factorise the tangent at the current state."""
 
     def renew(self) -> bool | None:
-        """Bring the tangent up to date with what touches now (hifi.path.low_rank)."""
+        """Take what touches now, for `solve` and `correction`; whether that has changed, or None where a new
+        tangent is due (hifi.contact.correction)."""
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """K^-1 times (n,), K possibly an older tangent."""
+
+    def correction(self, residual: np.ndarray) -> np.ndarray:
+        """(n,) minus that, with the contact law's own change instead of its slope where walls touch."""
 
     def at_supports(self, state: np.ndarray) -> np.ndarray:
         """The state with what is prescribed at its values for the present load."""

@@ -3,6 +3,7 @@ up to date."""
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from pneunet.base.materials.laws import NeoHookean
@@ -10,10 +11,10 @@ from pneunet.geometry.cad.cell import mesh_cell
 from pneunet.geometry.reference_cases import CASES
 from pneunet.hifi.cell.problem import CellProblem
 from pneunet.hifi.cell.system import CellSystem
+from pneunet.hifi.contact.correction import ContactCorrection, WallPoints
 from pneunet.hifi.contact.gaps import Side
 from pneunet.hifi.contact.penalty import PenaltyLaw, WallPenalty, touching
 from pneunet.hifi.fem.facets import kind_of
-from pneunet.hifi.path.low_rank import ContactUpdate
 from pneunet.hifi.verification.pressed import pressed
 
 serial = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="cells are serial")
@@ -212,40 +213,70 @@ def test_pressed_cylinders_carry_the_exact_force_and_no_torque(tmp_path):
     assert state.contact.force == pytest.approx(-state.force[0], rel=1e-6)
 
 
-class Points:
-    """A stand-in for a system: K (n, n) and gaps with gradients (m, n) whose stiffnesses come and go."""
+class Springs:
+    """A stand-in for a system: a bare K (n, n), and points with gradients (m, n) of their gaps; its tangent
+    is that of the overlaps `then` (m,)."""
 
-    def __init__(self, n=12, m=7):
+    def __init__(self, then, n=12, m=7):
         rng = np.random.default_rng(6)
         A = rng.normal(size=(n, n))
-        self.bare, self.rows, self.right = A @ A.T + np.eye(n), rng.normal(size=(m, n)), rng.normal(size=n)
+        self.bare, self.rows = A @ A.T + np.eye(n), rng.normal(size=(m, n))
+        self.force, self.then, self.columns = rng.normal(size=n), self.points(then), 0
+        slopes = [self.then.slopes.get(p, 0.0) for p in range(m)]
+        self.inverse = np.linalg.inv(self.bare + self.rows.T @ (np.array(slopes)[:, None] * self.rows))
+        self.contact = ContactCorrection(self.then, most=5)
 
-    def matrix(self, stiffnesses):
-        return self.bare + sum(k * np.outer(self.rows[p], self.rows[p]) for p, k in stiffnesses.items())
-
-    def update(self, then):
-        K = np.linalg.inv(self.matrix(then))
-        update = ContactUpdate(then, most=5)
-        return (
-            lambda now: update.renew(now, lambda points: self.rows[points], lambda b: K @ b)
-        ), lambda: update.corrected(K @ self.right)
-
-
-def test_an_updated_tangent_solves_as_one_factorised_anew():
-    points = Points()
-    renew, solution = points.update({0: 3.0, 1: 2.0, 2: 1.0})
-    for now in ({0: 3.0, 3: 2.0}, {0: 3.0, 3: 2.0, 4: 5.0, 1: 0.5}, {}):
-        assert renew(now) is True
-        assert solution() == pytest.approx(
-            np.linalg.solve(points.matrix(now), points.right), rel=1e-9, abs=1e-12
+    def points(self, overlaps):
+        m = len(overlaps)
+        return WallPoints(
+            list(range(m)), np.ones(m), np.asarray(overlaps, float), np.full(m, 3.0), np.full(m, 0.02)
         )
-        assert renew(now) is False
+
+    def solve(self, right):
+        self.columns += right.shape[1]
+        return self.inverse @ right
+
+    def renew(self, overlaps):
+        return self.contact.renew(
+            self.points(overlaps), lambda names: sp.csr_matrix(self.rows[names]), self.solve
+        )
+
+    def corrected(self, **more):
+        return self.contact.corrected(self.inverse @ self.force, np.linalg.norm(self.force), **more)
 
 
-def test_little_changes_are_left_alone_and_many_ask_for_a_factorisation():
-    points = Points()
-    renew, solution = points.update({0: 3.0, 1: 2.0})
-    before = solution()
-    assert renew({0: 3.0, 1: 1.99}) is False
-    assert (solution() == before).all()
-    assert renew({p: 1.0 for p in range(6)}) is None
+THEN = [0.5, 0.5, 0.5, -9, -9, -9, -9]
+
+
+def test_a_correction_by_slopes_is_that_of_a_tangent_factorised_anew():
+    springs = Springs(THEN)
+    for now in ([0.5, -9, -9, 0.4, -9, -9, -9], [0.01, 0.5, -9, 0.4, -9, -9, -9], 7 * [-9]):
+        assert springs.renew(now) is True
+        slopes = springs.points(now).pushes()[2]
+        whole = springs.bare + springs.rows.T @ (slopes[:, None] * springs.rows)
+        exact = np.linalg.solve(whole, springs.force)
+        assert springs.corrected(straight=True) == pytest.approx(exact, rel=1e-9, abs=1e-12)
+        assert springs.renew(now) is False
+
+
+def test_a_correction_by_the_law_balances_the_pushes_that_it_leads_to():
+    springs, now = Springs(THEN), [0.03, 0.02, -0.02, 0.01, -0.03, 0.03, -9]
+    springs.force *= -1
+    springs.renew(now)
+    d = springs.corrected()
+    before, after = (springs.points(now).pushes(opening)[1] for opening in (0.0, springs.rows @ d))
+    assert ((before == 0) & (after > 0)).any() and ((before > 0) & (after == 0)).any()
+    left = springs.bare @ d - springs.force - springs.rows.T @ (after - before)
+    assert np.linalg.norm(left) < 0.03 * np.linalg.norm(springs.force)
+
+
+def test_points_that_change_nothing_cost_no_column_and_many_ask_for_a_factorisation():
+    springs = Springs(THEN)
+    assert springs.renew(THEN) is False
+    assert (springs.corrected() == springs.inverse @ springs.force).all() and springs.columns == 0
+    springs.renew(7 * [0.5])
+    springs.corrected(straight=True)
+    assert springs.columns == 4  # the first three are in the tangent
+    springs.renew([0.2, -9, -9, 0.5, 0.5, 0.5, 0.5])
+    springs.corrected(straight=True)
+    assert springs.columns == 6 and springs.renew(THEN) is None
