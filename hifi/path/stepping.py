@@ -128,7 +128,7 @@ def run_steps(
             continue
         if load == milestones[0]:
             milestones.pop(0)
-        if iterations <= size.target_iterations and factorisations <= 1:
+        if iterations <= size.target_iterations:
             step = max(step, attempted) * size.growth_factor
         elif iterations > 2 * size.target_iterations:
             step = max(attempted * 0.7, size.smallest)
