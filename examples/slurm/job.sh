@@ -28,6 +28,8 @@ back_into_the_queue() {
 }
 trap back_into_the_queue USR1
 
-mpirun ${PNEUNET:-pneunet} "$@" &
+pneunet=(${PNEUNET:-pneunet})
+[ ! -x "${PNEUNET:-}" ] || pneunet=("$PNEUNET") # a path, spaces and all
+mpirun "${pneunet[@]}" "$@" &
 ranks=$!
 wait "$ranks"
