@@ -11,9 +11,11 @@ from tests import slurm
 @pytest.mark.skipif(bool(slurm.missing()), reason=slurm.missing())
 def test_a_job_whose_time_is_over_goes_back_into_the_queue_and_on(tmp_path):
     """Toy cases on two ranks, told so after the first one; what is on disk then is not computed again."""
-    cases = tmp_path / "cases"
+    cases, program = tmp_path / "cases", tmp_path / "a pneunet"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m tests.toy_cases "$@"\n')
+    program.chmod(0o755)
     with slurm.private_slurm() as env:
-        env["PNEUNET"] = f"{sys.executable} -m tests.toy_cases"
+        env["PNEUNET"] = str(program)
         job = slurm.Job.submit(env, tmp_path, [cases, "naps"])
         job.wait_for(lambda: list(cases.glob("*/record.json")))
         job.time_is_over()
