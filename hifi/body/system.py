@@ -11,9 +11,6 @@ from pneunet.hifi.contact.correction import ContactCorrection
 from pneunet.hifi.fem.solver import DirectSolver
 from pneunet.hifi.path.rod_coordinates import RodCoordinates
 
-#: points of walls whose columns cost as much as a tangent that is factorised anew
-MOST_TOUCHES = 200
-
 
 class BodySystem:
     """State: the mixed vector with ghosts. `apply_load(load)` sets the values of the problem's loads, each
@@ -77,7 +74,7 @@ class BodySystem:
         self.solver.factorise()
         self._rotation_then = self._rotations()
         touching = self.problem.contact.points(factorised=True)
-        self._contact = ContactCorrection(touching, MOST_TOUCHES, self.comm.allreduce)
+        self._contact = ContactCorrection(touching, total=self.comm.allreduce)
         self.renew()
 
     @property
