@@ -54,7 +54,7 @@ def whitening(kind: str, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @dataclass(frozen=True)
 class Anharmonic:
     """coefficients (m, 1 + f) of `monomials(kind)`, constant and by inputs x (f,) from `centre` in units of
-    `width`, times cos(angle) where odd in the mirror; reach: largest |v| it was trained on.
+    `width`, times cos(angle) where odd in the mirror.
 
     Evaluated as symmetric tensors of second derivatives: that of a form of degree n is its Hessian, twice
     contracted n (n - 1) times its value.
@@ -64,7 +64,6 @@ class Anharmonic:
     coefficients: np.ndarray
     centre: np.ndarray
     width: np.ndarray
-    reach: float
 
     @cached_property
     def _tensors(self):

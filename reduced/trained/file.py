@@ -21,7 +21,7 @@ from pneunet.reduced.trained.mesh import MeshDifference
 from pneunet.reduced.trained.recorded import Recorded
 from pneunet.reduced.trained.side_by_side import SideBySide
 
-SCHEMA = "pneunet-law-9"
+SCHEMA = "pneunet-law-10"
 KEYS = {"kinds": list, "numbers": list, "lengths": dict}
 #: fields of the Gaussian processes side by side that are the same in all of them
 COMMON = ("shift", "width", "inducing", "observed", "group", "at", "ways")
@@ -36,9 +36,9 @@ PROCESSES = ("closing", "path", "start", "stiffness", "contact", "recorded", "me
 OPTIONAL = ("closing", "contact", "recorded", "mesh", "mesh stiffness")
 #: those whose deviations or covariances are asked for
 DEVIATING = ("path", "contact")
-ANHARMONIC = ("coefficients", "centre", "width", "reach")
+ANHARMONIC = ("coefficients", "centre", "width")
 NOISES = ("noise", "common_noise", "slope_noise")
-OF_MESH = ("left", "stiffness_left", "uncertainty")
+OF_MESH = ("left", "stiffness_left", "uncertainty", "uncertainty_at_lead")
 
 
 def write_law(path: Path, law: TrainedLaw) -> None:
@@ -142,10 +142,10 @@ def _members(about: dict, names: Collection[str]) -> dict[str, Member]:
             "left": Member("f", ()),
             "stiffness_left": Member("f", ()),
             "uncertainty": Member("f", (), 0.0),
+            "uncertainty_at_lead": Member("f", (), 0.0),
             "anharmonic/coefficients": Member("f", (len(monomials(kind)), d + 3)),
             "anharmonic/centre": Member("f", (d + 2,)),
             "anharmonic/width": Member("f", (d + 2,), POSITIVE),
-            "anharmonic/reach": Member("f", (), 0.0),
         }
         out |= {f"{kind}/{name}": form for name, form in own.items()}
     return out

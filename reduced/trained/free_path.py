@@ -159,10 +159,11 @@ class FreePath:
 
     def strains_and_spread(
         self, numbers: np.ndarray, pressure: np.ndarray, exact: bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(free strains (n, 6), their standard deviation (n, 6)) as the Gaussian processes see it, taken as
-        independent; from the inducing points alone and the remainder (measured: in the shipped law's range 90
-        % lie within 2 % of it), or exact, which takes some ten seconds once."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(free strains (n, 6), their standard deviation (n, 6), d log P/d log(leading strain) (n,)) as the
+        Gaussian processes see it, taken as independent; from the inducing points alone and the remainder
+        (measured: in the shipped law's range 90 % lie within 2 % of it), or exact, which takes some ten
+        seconds once."""
         state = self.state_and_slopes(numbers, pressure)
         x, lead, ratios, by_lead = state.inputs, state.chain.lead, state.learned[:, 1:], state.by_lead
         deviation = self.learned.deviation(x) if exact else self._deviations(x)
@@ -172,7 +173,7 @@ class FreePath:
         with_lead = ratios + by_lead[:, 1:] * lead[:, None]
         c = np.abs(odd(self.coordinates.strain_parity[1:], cosine(numbers)))
         out[:, others] = c * np.hypot(lead[:, None] * deviation[:, 1:], with_lead * of_lead[:, None])
-        return self.coordinates.strains(numbers, lead, ratios), out
+        return self.coordinates.strains(numbers, lead, ratios), out, state.steep
 
     def _deviation(self, number, left):
         """(n, p) standard deviations of what a learned process says where its inducing points leave this

@@ -82,6 +82,12 @@ class KindLaw:
         could go on: from 1 on they touch."""
         return self.path.closing.closed(numbers, pressure, strains)
 
+    def closed_on_the_way(self, numbers: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """(n,) largest part of the gap that walls have closed on the way to free states."""
+        pressure = np.maximum(pressure, LOWEST)
+        lead = self.coordinates.leading(self.free_strains(numbers, pressure))
+        return self.path.closing.closed_on_the_way(numbers, pressure, lead)[0]
+
     def anharmonic_at(self, numbers: np.ndarray, strains: np.ndarray, closed: np.ndarray) -> Tensors:
         """What reduced.trained.enthalpy's anharmonic forms are made of around free states with these strains
         (n, 6)."""
@@ -89,15 +95,17 @@ class KindLaw:
 
     def half_width(self, numbers: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(n, 6) half of the 90 % interval of each free strain, what is uncertain of the grid included."""
-        strains, own = self.strains_and_own_half_width(numbers, pressure)
-        return np.hypot(own, self.mesh.uncertainty * (strains - REST))
+        strains, spread, steep = self.path.strains_and_spread(numbers, np.maximum(pressure, LOWEST))
+        # where the pressure hardly rises, a small error of it is a large one of the strains
+        grid = self.mesh.uncertainty_at_lead / np.minimum(steep, 1)
+        return np.hypot(self.quantile * spread, grid[:, None] * (strains - REST))
 
     def strains_and_own_half_width(
         self, numbers: np.ndarray, pressure: np.ndarray, exact: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
         """(free strains (n, 6), half of their 90 % intervals (n, 6)) without what is uncertain of the grid;
         exact: as for FreePath.strains_and_spread."""
-        strains, spread = self.path.strains_and_spread(numbers, np.maximum(pressure, LOWEST), exact)
+        strains, spread, _ = self.path.strains_and_spread(numbers, np.maximum(pressure, LOWEST), exact)
         return strains, self.quantile * spread
 
     def recorded_at(self, numbers: np.ndarray, pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -137,9 +145,9 @@ class KindLaw:
         return np.where(width > 0, width, 1.0)  # of a silicone's stiffening it may be 0
 
     def with_slopes(self, numbers: np.ndarray, pressure: np.ndarray) -> tuple[Slopes, Slopes, Slopes, Slopes]:
-        """(`free_strains` (n, 6), `excess` (n, r + 2), `closed` (n,), largest stretch (n,)), each with its
-        derivatives (..., 14) by the 13 shape numbers (the angle in degrees) and P/mu: everything from one
-        search. A stretch of which the data did not tell is nan."""
+        """(`free_strains` (n, 6), `excess` (n, r + 2), `closed_on_the_way` (n,), largest stretch (n,)), each
+        with its derivatives (..., 14) by the 13 shape numbers (the angle in degrees) and P/mu: everything
+        from one search. A stretch of which the data did not tell is nan."""
         pressure = np.maximum(pressure, LOWEST)
         state = self.path.state_and_slopes(numbers, pressure, NEARER)
         x = self.ranged(numbers, pressure)
@@ -152,4 +160,6 @@ class KindLaw:
             by[:, -2], by[:, -1] = state.of_inputs(by_inputs) / self.known, state.beyond_by
         unknown = np.full(len(numbers), np.nan), np.full((len(numbers), len(SHAPE) + 1), np.nan)
         stretch = self.recorded.stretch_and_slopes(state) if self.recorded else unknown
-        return state.strains_and_slopes(), (excess, by), state.closed_and_slopes(), stretch
+        closed, closed_by, by_lead = self.path.closing.closed_on_the_way(numbers, pressure, state.chain.lead)
+        closed_by += by_lead[:, None] * state.lead_by
+        return state.strains_and_slopes(), (excess, by), (closed, closed_by), stretch

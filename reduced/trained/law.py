@@ -127,8 +127,7 @@ class TrainedLaw(SegmentLaw):
         law = self._kind(segment)
         if law.recorded is None:
             return super().walls(segment, pressure)
-        closed = law.closed(numbers, p, law.free_strains(numbers, p))
-        return float(closed[0]), float(law.recorded_at(numbers, p)[0][0])
+        return float(law.closed_on_the_way(numbers, p)[0]), float(law.recorded_at(numbers, p)[0][0])
 
     def half_width(self, segment: Segment, pressure: float) -> np.ndarray:
         """As SegmentLaw.half_width."""

@@ -20,7 +20,8 @@ class MeshDifference:
     """strains, stiffness: processes at Coordinates.lead_inputs of what is added to learned_strains and
     learned_stiffness of a state on the coarse grid; None where too few designs are computed on finer ones:
     nothing is added then. left, stiffness_left: part of that which a state on the fine grid still lacks;
-    uncertainty: of strains so found, over themselves: half of a 90 % interval."""
+    uncertainty: of strains so found, over themselves: half of a 90 % interval; uncertainty_at_lead: the same
+    of pressure and strains at a leading strain, without what a flat path makes of it."""
 
     kind: str
     strains: SideBySide | None
@@ -28,11 +29,12 @@ class MeshDifference:
     left: float
     stiffness_left: float
     uncertainty: float
+    uncertainty_at_lead: float
 
     @classmethod
     def none(cls, kind: str) -> "MeshDifference":
         """Of one grid alone."""
-        return cls(kind, None, None, 1.0, 1.0, 0.0)
+        return cls(kind, None, None, 1.0, 1.0, 0.0, 0.0)
 
     @cached_property
     def coordinates(self) -> Coordinates:

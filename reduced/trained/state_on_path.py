@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pneunet.reduced.trained.coordinates import GAP, LEAD, OVERLAP, SMALL_STRAIN, SMALLEST, Coordinates
+from pneunet.reduced.trained.coordinates import LEAD, OVERLAP, SMALL_STRAIN, Coordinates
 
 
 @dataclass(frozen=True)
@@ -85,10 +85,3 @@ class StateOnPath:
     def beyond_by(self) -> np.ndarray:
         """(n, 14) derivatives of `beyond`: at the path's end the leading strain does not count."""
         return (self.beyond > 0)[:, None] * self.missing_by
-
-    def closed_and_slopes(self) -> tuple[np.ndarray, np.ndarray]:
-        """(part of the gap that walls have closed (n,), its derivatives (n, 14))."""
-        chain, gap = self.chain, np.maximum(self.chain.numbers[:, GAP], SMALLEST)
-        by = (chain.overlap_by + chain.overlap_by_lead[:, None] * self.lead_by) / gap[:, None]
-        by[:, GAP] -= chain.overlap / gap**2
-        return 1 + chain.overlap / gap, by

@@ -43,6 +43,4 @@ def fit_anharmonic(
     b = ((wanted - v) / size).ravel()
     gram, own = A.T @ A, np.tile(np.repeat(RIDGE, [1, x.shape[1]]), len(monomials(kind)))
     weights = np.linalg.solve(gram + np.diag(own), A.T @ b)
-    return Anharmonic(
-        kind, weights.reshape(len(monomials(kind)), -1), centre, width, float(np.linalg.norm(v, axis=1).max())
-    )
+    return Anharmonic(kind, weights.reshape(len(monomials(kind)), -1), centre, width)

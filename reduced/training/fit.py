@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pneunet.reduced.trained.closing import Closing
+from pneunet.geometry.parameters import ONE_SIDED, TWISTING
+from pneunet.reduced.trained.closing import Closing, learned_closing
 from pneunet.reduced.trained.coordinates import Coordinates, cosine, odd
 from pneunet.reduced.trained.enthalpy import symmetric
 from pneunet.reduced.trained.free_path import FreePath
@@ -28,11 +29,13 @@ FOLDS = 10
 #: the training designs' ranges are widened by this part before a design is outside
 MARGIN = 0.02
 
-#: points that the free states are summed up on, as many as a rod of both kinds may cost in half a
-#: millisecond; those of how walls close; those of the rough process that the search for the leading strain
-#: starts from: within some 3 % of it (measured: median), from where one step is mostly enough; and those of
-#: the stiffness
-INDUCING, CLOSING, ROUGH, OF_STIFFNESS, OF_RECORDED = 1600, 1000, 300, 2200, 600
+#: points that the free states are summed up on: more where that many states are known (measured, twisting:
+#: half of 1,600 points' error)
+INDUCING = {ONE_SIDED: 1600, TWISTING: 3200}
+#: those of how walls close; of the rough process that the search for the leading strain starts from: within
+#: some 3 % of it (measured: median), from where one step is mostly enough; of the stiffness; and of what is
+#: recorded besides
+CLOSING, ROUGH, OF_STIFFNESS, OF_RECORDED = 1000, 300, 2200, 600
 #: times the largest leading strain of the training designs: up to there paths of free states are followed
 FURTHEST = 1.2
 #: a deviation above this many times the largest one at the training points, rest included, is outside
@@ -113,7 +116,7 @@ def fit_strains(
     regression.fit."""
     trust = odd(Coordinates(states.kind).strain_parity, np.abs(cosine(states.numbers)))
     data = x[good], y[good], states.design[good], trust[good]
-    settings = FitSettings(inducing=INDUCING, again=again)
+    settings = FitSettings(inducing=INDUCING[states.kind], again=again)
     return fit_side_by_side(*data, (1, y.shape[1] - 1), slopes, like, settings)
 
 
@@ -124,7 +127,7 @@ def fit_closing(states: States, like: SideBySide | None = None, again: bool = Fa
     states = states.of(np.isfinite(states.closing))
     co = Coordinates(states.kind)
     x = co.closing_inputs(states.numbers, co.closing_load(states.pressure, co.leading(states.strains)))
-    data = x, states.closing[:, None], states.design, np.ones((len(x), 1))
+    data = x, learned_closing(states.closing)[:, None], states.design, np.ones((len(x), 1))
     settings = FitSettings(most=MANY, inducing=CLOSING, again=again)
     return Closing(states.kind, fit_side_by_side(*data, (1,), like=like, settings=settings))
 
@@ -236,7 +239,7 @@ def _quantiles(law, states, drawn):
     for judged in folds(np.unique(states.design[states.design < drawn]), FOLDS):
         out = np.isin(states.design, judged)
         path, t = fit_path(states.of(~out), like=law.path), states.of(out)
-        found, spread = path.strains_and_spread(t.numbers, t.pressure, exact=True)
+        found, spread, _ = path.strains_and_spread(t.numbers, t.pressure, exact=True)
         miss = np.abs(found - t.strains)
         scores.append(np.divide(miss, spread, out=np.zeros_like(miss), where=spread > 0))
     return np.quantile(np.concatenate(scores), INTERVAL, axis=0)

@@ -108,17 +108,17 @@ def fit_meshes(
     every = [np.ones(len(found[0].inputs), bool) for found in (of_strains, of_stiffness)]
     processes = of_strains[0].fitted(every[0], 1 + lacking, taken[0])
     if like and like.strains:
-        uncertain = like.uncertainty
+        uncertain = like.uncertainty, like.uncertainty_at_lead
     else:
         missed = _cross_validated(of_strains[0], 1 + lacking, processes)
-        uncertain = float(np.hypot(missed, doubt))
+        uncertain = np.hypot(missed, doubt).tolist()
     return MeshDifference(
         kind,
         processes,
         of_stiffness[0].fitted(every[1], 1 + stiffness_lacking, taken[1]),
         lacking / (1 + lacking),
         stiffness_lacking / (1 + stiffness_lacking),
-        uncertain,
+        *uncertain,
     )
 
 
@@ -174,12 +174,12 @@ def _interpolated(places, nodes, values):
 
 
 def _lacking(differences, leading):
-    """(what the fine grid still lacks, over its difference from the coarse one; what of the strains may
-    be wrong by that)."""
+    """(what the fine grid still lacks, over its difference from the coarse one; halves (2,) of 90 % intervals
+    of the _errors by that)."""
     fine = differences[0]
     if len(differences) < 2 or not len(np.intersect1d(fine.states.design, differences[-1].states.design)):
         log.info(f"{fine.states.kind}: no design on a finest grid: the law is one of the fine grid")
-        return 0.0, 0.0
+        return 0.0, np.zeros(2)
     finest = differences[-1]
     before = np.full(finest.values.shape, np.nan)
     for number in np.unique(finest.states.design):
@@ -191,12 +191,12 @@ def _lacking(differences, leading):
     share = max((trust**2 * before * more).sum() / max((trust**2 * before**2).sum(), 1e-30), 0.0)
     wrong = np.abs(more - share * before) + ORDER_UNKNOWN * np.abs(share * before)
     states = finest.states.of(known)
-    return share, float(np.quantile(_of_strains(states, trust * wrong), INTERVAL))
+    return share, np.quantile(_errors(states, trust * wrong), INTERVAL, axis=1)
 
 
-def _of_strains(states, error):
-    """(n,) error of the strains at a pressure over the leading strain, by that (n, p) of what is learned at a
-    leading strain, times its trust."""
+def _errors(states, error):
+    """(2, n) errors of the strains over the leading strain, at a pressure and at a leading strain, by that
+    (n, p) of what is learned at a leading strain, times its trust."""
     lead, steep = Coordinates(states.kind).leading(states.strains), np.ones(len(error))
     for number in np.unique(states.design):
         own = np.flatnonzero(states.design == number)
@@ -204,19 +204,20 @@ def _of_strains(states, error):
         if len(own) > 1:
             steep[own] = np.gradient(np.log(states.pressure[own]), np.log(lead[own]))
     # next to a limit load the leading strain grows without bound
-    return np.hypot(error[:, 0] / np.maximum(steep, FLATTEST), np.linalg.norm(error[:, 1:], axis=1))
+    at_pressure = np.hypot(error[:, 0] / np.maximum(steep, FLATTEST), np.linalg.norm(error[:, 1:], axis=1))
+    return np.stack([at_pressure, np.linalg.norm(error, axis=1)])
 
 
 def _cross_validated(differences, share, like):
-    """Half of a 90 % interval of what processes with the metrics and noises of `like` miss of the strains of
-    designs that they have not learned from, over the leading strain."""
+    """(2,) halves of 90 % intervals of the _errors of processes with the metrics and noises of `like`, for
+    designs that they have not learned from."""
     number, missed = differences.states.design, []
     for part in folds(np.unique(number), PARTS):
         out = np.isin(number, part)
         found = differences.fitted(~out, share, like)(differences.inputs[out])
         error = differences.trust[out] * (found - share * differences.values[out])
-        missed.append(_of_strains(differences.states.of(out), error))
-    return float(np.quantile(np.concatenate(missed), INTERVAL))
+        missed.append(_errors(differences.states.of(out), error))
+    return np.quantile(np.concatenate(missed, axis=1), INTERVAL, axis=1)
 
 
 def converged(states: States, mesh: MeshDifference, fine: bool = False) -> States:

@@ -143,8 +143,9 @@ def judged_on(training: Sample, held_out: Sample) -> str:
     """A sentence on which designs the figures are about."""
     designs, held = len(training.designs), len(held_out.designs)
     text = f"{designs} designs to train on, {held} held out."
-    parts = len(splits(training, held_out)) - 1
+    parts = splits(training, held_out)[1:]
     if parts:
-        text += f" The figures are of all {designs + held}: of the held-out ones by the law,"
-        text += f" of the others by cross-validation by design in {parts} parts."
+        judged = held + sum(len(part.designs) for _, part in parts)
+        text += f" The figures are of {judged} that were drawn alike: of the held-out ones by the law,"
+        text += f" of the others by cross-validation by design in {len(parts)} parts."
     return text

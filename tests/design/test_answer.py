@@ -192,8 +192,8 @@ def test_tolerances_are_what_small_changes_do():
 
 def test_an_answer_in_plain_words(tmp_path, capsys):
     t = np.linspace(0, 1, 80)
-    tight = np.column_stack([8 * np.sin(12 * t), 0 * t, 8 * np.cos(12 * t)])  # 125 1/m: nothing bends so much
-    tight[:, 1] = 60 * t
+    # 160 1/m: nothing bends so much
+    tight = np.column_stack([5 * np.sin(12 * t), 30 * t, 5 * np.cos(12 * t)])
     np.savetxt(tmp_path / "coil.csv", tight, "%.4f", ",", header="x_mm,y_mm,z_mm", comments="")
     assert main(["design", str(tmp_path / "coil.csv"), "-o", str(tmp_path / "out")]) == NOT_FOLLOWED
     result = read_design_file(tmp_path / "out" / "design.toml").result

@@ -29,7 +29,7 @@ SEGMENTS = (
 #: so that no station lies where a joint passes within the differences, where derivatives jump
 COUNTS = np.array([7.35, 5.1, 16.5, 0.0])
 #: of large changes: enough for the law's rounding, little enough for the differences
-STEP = 2e-3
+STEP = 5e-4
 
 
 def problem(law, objective="paired", frames=True):
@@ -87,7 +87,8 @@ def test_a_pressure_beyond_the_limit_point_is_misfit():
     body = replace(these.body, segments=(high, *SEGMENTS[1:]), pressures=np.full((2, 4), 0.1))
     there = replace(these, body=body)
     expected = BEYOND * law.excess(high, 0.1)[-1]
-    assert np.isclose(there.evaluate(there.x).residual, expected, rtol=1e-6).sum() == 2  # of each shape
+    found = there.evaluate(there.x).residual
+    assert np.isclose(found, expected, rtol=1e-5).sum() == 2  # of each shape, to the search's last 1e-5
 
 
 def test_the_gradient_to_nearest_points_is_exact():

@@ -44,7 +44,7 @@ def test_the_pack(tmp_path, capsys):
     grams = sum(pour["g"] * pour["casts"] for pour in pack["pours"])
     assert grams == pytest.approx(1.1 * volume * SILICONE.density * 1e6, abs=0.005)
     sheet = (folder / "sheet.html").read_text()
-    told = f"In all: {grams:.1f} g of Ecoflex 00-30", "2 pressure groups", "walls of segment", "upper-plate"
+    told = f"In all: {grams:.1f} g of Ecoflex 00-30", "2 pressure groups", "vouches no further", "upper-plate"
     assert all(text in sheet for text in told)
     # a second pack takes the place of the first
     (folder / "moulds" / "old-tray.stl").touch()

@@ -9,9 +9,11 @@ from pneunet.base.errors import InputError
 from pneunet.base.files.dataset import write_dataset
 from pneunet.base.materials.laws import NeoHookean, Ogden, Yeoh
 from pneunet.base.strains import MIRROR
-from pneunet.geometry.parameters import KINDS, ONE_SIDED, TWISTING
+from pneunet.geometry.parameters import KINDS, ONE_SIDED, TWISTING, Segment
 from pneunet.geometry.shape_numbers import numbers_of
+from pneunet.reduced.choice import shipped_law
 from pneunet.reduced.rod.states import VARIABLES
+from pneunet.reduced.trained.closing import Closing
 from pneunet.reduced.trained.coordinates import REST
 from pneunet.reduced.trained.file import read_law
 from pneunet.reduced.trained.law import TrainedLaw
@@ -186,6 +188,21 @@ def test_many_states_at_once_are_those_one_by_one(trained, kind):
         assert law.free_strains(numbers[i : i + 1], P[i : i + 1])[0] == pytest.approx(q[i], abs=1e-7)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_uncertain_grid_widens_error_bars_where_the_pressure_hardly_rises(trained, kind):
+    """By as much as strains change between the pressures that it may be wrong by."""
+    known, numbers, off = trained[0].kinds[kind], numbers_of([design(kind)])[0], 0.01
+    law = replace(known, quantile=np.zeros(6), mesh=replace(known.mesh, uncertainty_at_lead=off))
+    leading = law.coordinates.leading
+    for P in (np.array([0.1]), np.array([0.25])):
+        ends = [leading(law.free_strains(numbers, P * np.exp(sign * off))) for sign in (1, -1)]
+        steep = 2 * off / np.log(ends[0] / ends[1])
+        half = leading(law.half_width(numbers, P) + np.eye(6)[0] * (kind == TWISTING))
+        assert half / leading(law.free_strains(numbers, P)) == pytest.approx(
+            off / np.minimum(steep, 1), rel=1e-2
+        )
+
+
 def test_a_file_gives_the_same_law(trained):
     law, folder = trained
     again = read_law(folder / "law.npz")
@@ -214,3 +231,19 @@ def test_on_the_same_data_the_metrics_of_a_law_give_it_again(trained):
         )
         assert again.kinds[kind].quantile == pytest.approx(law.kinds[kind].quantile, rel=1e-6)
     assert "like_sha256" in again.about and "like_sha256" not in law.about
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_walls_that_have_touched_on_the_way_count_as_touching(kind):
+    """Whatever is learned of loads far beyond touch: the closing there is turned back by hand."""
+    known = shipped_law().kinds[kind]
+    numbers, P = numbers_of([Segment(kind, 60.0, 1, chamber_height=6.0)])[0], np.array([0.15])
+
+    class Back(Closing):
+        def overlap_and_slopes(self, numbers, pressure, lead):
+            overlap, by, by_lead = super().overlap_and_slopes(numbers, pressure, lead)
+            return np.where(pressure > 0.14, -1.0, overlap), by, by_lead
+
+    turned = replace(known, path=replace(known.path, closing=Back(kind, known.path.closing.process)))
+    earlier, there = (law.closed_on_the_way(numbers, P) for law in (turned, known))
+    assert 1 < earlier < there

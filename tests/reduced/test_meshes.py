@@ -39,7 +39,7 @@ def test_states_on_the_coarse_grid_become_those_of_ever_finer_ones(learned):
     assert (found.pressure < coarse.pressure).all() and (lead(found.strains) == lead(coarse.strains)).all()
     for states in (found, truth(held_out, mesh).free.loaded):
         assert strain_error(states, true_states(true_free, states)).max() < 0.01
-    assert 0 < mesh.uncertainty < 0.02
+    assert 0 < mesh.uncertainty < 0.02 and 0 < mesh.uncertainty_at_lead < 0.02
 
 
 def test_stiffness_and_forces_go_along(learned):
