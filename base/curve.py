@@ -48,12 +48,8 @@ class Curve:
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
         """For every one of points (n, 3) the nearest point (n, 3) of the curve, vertices or between them."""
-        start, step = self.points[:-1], np.diff(self.points, axis=0)
-        squared = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
-        along = np.clip(np.einsum("nmk,mk->nm", points[:, None] - start, step) / squared, 0, 1)
-        feet = start + along[..., None] * step
-        best = np.argmin(np.sum((points[:, None] - feet) ** 2, axis=2), axis=1)
-        return feet[np.arange(len(points)), best]
+        edge, share = nearest_on(self.points, points)
+        return self.points[edge] + share[:, None] * np.diff(self.points, axis=0)[edge]
 
     def frenet(self, window: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(arc lengths (m,) in mm, curvature (m,) in 1/mm, torsion (m,) in rad/mm).
@@ -74,3 +70,14 @@ class Curve:
         bent = curvature * self.length > 0.1
         torsion = np.divide(np.sum(cross * third, axis=1), size**2, out=np.zeros(FINE), where=bent)
         return np.linspace(0, self.length, FINE), curvature, torsion
+
+
+def nearest_on(vertices: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For every one of points (n, 3), where the nearest point of a polyline (m, 3) lies: its edge's number
+    (n,) from 0, and the share (n,) of the edge before it."""
+    start, step = vertices[:-1], np.diff(vertices, axis=0)
+    squared = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
+    along = np.clip(np.einsum("nmk,mk->nm", points[:, None] - start, step) / squared, 0, 1)
+    apart = np.sum((points[:, None] - start - along[..., None] * step) ** 2, axis=2)
+    edge = np.argmin(apart, axis=1)
+    return edge, along[np.arange(len(points)), edge]

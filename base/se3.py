@@ -8,6 +8,8 @@ Introduction to Robotic Manipulation (1994), App. A; series below `SMALL` keep t
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pneunet.base.errors import InputError
+
 SMALL = 1e-4
 #: (4, 4), of poses; read only
 IDENTITY = np.eye(4)
@@ -23,6 +25,23 @@ def _generators():
 
 
 _GENERATORS = _generators()
+
+
+def is_pose(given: ArrayLike) -> bool:
+    """Whether it is (4, 4): a rotation, a finite origin, and a last row 0, 0, 0, 1."""
+    pose = np.asarray(given)
+    if pose.shape != (4, 4) or pose.dtype.kind not in "fi" or not np.isfinite(pose).all():
+        return False
+    R = pose[:3, :3]
+    turns = abs(R.T @ R - np.eye(3)).max() <= 1e-6 and np.linalg.det(R) > 0
+    return bool(turns and (pose[3] == [0, 0, 0, 1]).all())
+
+
+def checked_pose(given: ArrayLike, name: str) -> np.ndarray:
+    """A pose (4, 4) as floats; InputError by this name for anything else."""
+    if not is_pose(given):
+        raise InputError(f"{name} must be (4, 4): a rotation, an origin in mm, and a last row 0, 0, 0, 1")
+    return np.asarray(given, float)
 
 
 def hat(vector: ArrayLike) -> np.ndarray:

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
-from pneunet.design.segmentation.segmentation import piece_tables
+from pneunet.design.segmentation.segmentation import is_piece_row, piece_tables
 from pneunet.design.target.metrics import FOLLOWED, Errors, compare
 from pneunet.design.target.target import Target
 from pneunet.geometry.designfile import DesignFile, read_design_file, write_design_file
@@ -25,8 +26,7 @@ from pneunet.reduced.choice import choose_law
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.overlap import overlap_doubts
-from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
-from pneunet.reduced.rod.rod import Rod
+from pneunet.reduced.rod.prediction import doubts, predict_design, segment_strains
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,8 +43,6 @@ points = "target.csv"
 """
 #: of run.json: what belongs to the search
 EFFORT = ("inputs", "evaluations", "wall_seconds")
-#: of the length, by which elements of a loaded rod may be off
-LOADED = 1e-4
 log = logging.getLogger(__name__)
 
 
@@ -100,7 +98,7 @@ class Design:
             content,
             chosen_law(folder.law if law is None else law),
             None if folder.target is None else Target(folder.target, content.name),
-            tuple(told.get("active_bounds", ())),
+            _active_bounds(told, path),
             {key: folder.record[key] for key in EFFORT if key in folder.record},
         )
 
@@ -173,7 +171,7 @@ class Design:
     def strains(self) -> RodStrains:
         """RodStrains (segments, 3) of the segments' active parts at the design's pressure, in the body's
         axes."""
-        return segment_strains(self.manipulator, self.content.pressure, self.law)
+        return segment_strains(self.manipulator, self.prediction)
 
     @overload
     def predict(self, pressures_kPa: float) -> Centreline: ...
@@ -198,11 +196,7 @@ class Design:
         ]
 
     def _predicted(self, pressure):
-        content = self.content
-        if not content.loads:
-            return predict(self.manipulator, pressure, self.law, base_pose=content.base_pose)
-        rod = Rod.of(self.manipulator, self.law, pressure, content.base_pose)
-        return rod.equilibrium(content.loads, tolerance=LOADED).line
+        return predict_design(self.content, pressure, self.law)
 
     def save(self, directory: str | Path) -> Path:
         """`write` to a folder, which is made if need be; the folder. InputError where a run is at work in
@@ -295,3 +289,13 @@ class Design:
 def chosen_law(law: str | SegmentLaw) -> SegmentLaw:
     """A law by its name or file, or as it is; InputError where there is none of that name."""
     return choose_law(law) if isinstance(law, str) else law
+
+
+def _active_bounds(result, where):
+    """Those that [result] lists; InputError where what is read back of it was edited into something else."""
+    bounds, rows = result.get("active_bounds", []), result.get("piece", [])
+    if not isinstance(bounds, list) or not all(isinstance(text, str) for text in bounds):
+        raise InputError(f"{where} [result]: 'active_bounds' must be a list of texts: leave it out")
+    if not isinstance(rows, list) or not all(is_piece_row(row) for row in rows):
+        raise InputError(f"{where} [result]: 'piece' is not as pneunet design writes it: leave it out")
+    return tuple(bounds)

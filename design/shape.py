@@ -101,7 +101,7 @@ def _write(folder, design_path, design, shapes, failed, doubted):
         tip = ", ".join(f"{x:.1f}" for x in line.points[-1])
         log.info(f"  {_each(design, p):>10}: length {line.length:.1f} mm, tip at ({tip}) mm")
     try:
-        _pictures(design, list(shapes), folder)
+        _pictures(design, shapes, folder)
     except ImportError as error:
         log.info(f"no pictures: {error}; install them with: pip install 'pneunet[pictures]'")
     write_record(
@@ -128,25 +128,22 @@ def _list(pressures):
     return ", ".join(plain(p) for p in pressures)
 
 
-def _pictures(design, pressures, folder):
-    bodies = _bodies(design, pressures)
-    for p, (vertices, quads, segments) in zip(pressures, bodies):
+def _pictures(design, shapes, folder):
+    bodies = _bodies(design, progress(shapes.values(), "bodies"))
+    for p, (vertices, quads, segments) in zip(shapes, bodies):
         write_quads(folder / f"body_{plain(p)}kPa.vtp", vertices, quads, {"segment": segments + 1})
-    titles = [_each(design, p) for p in pressures]
+    titles = [_each(design, p) for p in shapes]
     _picture_of_all(design.content.name, titles, bodies, folder / "bodies.png")
     log.info(f"bodies at every pressure: {folder / 'bodies.png'}; {FRAMES} frames of the inflation follow")
-    highest = max(pressures)
+    highest = max(shapes)
     if highest > 0:
         _animation(design, highest, folder / "inflation.gif")
         log.info(f"inflation from 0 to {plain(highest)} kPa: {folder / 'inflation.gif'}")
 
 
-def _bodies(design, pressures):
-    """`body_surface` at pressures in kPa."""
-    pose = design.content.base_pose
-    scaled = [design.content.scaled(in_MPa(p)) for p in pressures]
-    each = progress(scaled, "bodies")
-    return [body_surface(design.manipulator, p, design.law, SPACING, pose) for p in each]
+def _bodies(design, lines):
+    """`body_surface` along centrelines."""
+    return [body_surface(design.manipulator, line, SPACING) for line in lines]
 
 
 def _view(bodies):
@@ -182,7 +179,7 @@ def _animation(design, highest, path):
     from PIL import Image
 
     pressures, frames = highest * np.linspace(0, 1, FRAMES), []
-    bodies = _bodies(design, pressures)
+    bodies = _bodies(design, map(design.predict, progress(pressures, "bodies")))
     view = _view(bodies)
     for p, body in progress(zip(pressures, bodies), "frames", FRAMES):
         frame = _painted(view, body, FRAME_PIXELS)

@@ -20,7 +20,7 @@ from pneunet.base.files.archive import write_archive
 from pneunet.base.files.atomic import write_csv
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
-from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown
+from pneunet.base.files.toml import array, from_table, number, read_toml, refuse_unknown
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, material_from_table
 from pneunet.base.pictures import rendering
 from pneunet.base.progress import progress
@@ -110,10 +110,11 @@ class WorkspaceCase(Checked):
         refuse_unknown(table, (*quantities(cls), *special), where)
         given: dict = {"name": str(table.get("name", Path(path).stem))}
         if "angles_deg" in table:
-            given["angles"] = _numbers(table["angles_deg"], "angles_deg", where, 2)
+            ends = array(table["angles_deg"], "angles_deg", where, "[smallest, largest]", (2,))
+            given["angles"] = tuple(ends.tolist())
         if "pressures_kPa" in table:
-            kPa = _numbers(table["pressures_kPa"], "pressures_kPa", where)
-            given["pressures"] = tuple(MPA_PER_KPA * p for p in kPa)
+            kPa = array(table["pressures_kPa"], "pressures_kPa", where, "a list of numbers", (None,))
+            given["pressures"] = tuple((MPA_PER_KPA * kPa).tolist())
         if "chains" in table:
             given["chains"] = _chains(table["chains"], where)
         if "material" in table:
@@ -144,13 +145,6 @@ class WorkspaceCase(Checked):
         """A segment of a kind at an angle in degrees. InputError where it cannot be built."""
         one = Segment(kind, angle, 1, **(START[kind] | self.start), material=self.material)
         return replace(one, chambers=max(1, 1 + round((self.length - one.length) / one.pitch)))
-
-
-def _numbers(value, key, where, count=None):
-    if not isinstance(value, list) or count not in (None, len(value)):
-        form = "[smallest, largest]" if count else "a list of numbers"
-        raise InputError(f"{where}: '{key}' must be {form}, not {shown(value)}")
-    return tuple(float(number(v, key, where)) for v in value)
 
 
 def _chains(value, where):

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.files.schemas import MEAN_STRETCH
 from pneunet.base.pictures.rendering import coloured, edges, figure, render, save, view_of
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.design.report.bodies import body_mesh, deformed_surface, painted, read_solution, tube
@@ -19,7 +20,8 @@ from pneunet.design.report.labels import FINITE_ELEMENTS, REDUCED
 from pneunet.geometry import tags
 from pneunet.geometry.designfile import read_design
 from pneunet.geometry.reference_cases import CASES
-from pneunet.reduced import predict, shipped_law
+from pneunet.reduced import shipped_law
+from pneunet.reduced.rod.prediction import predict_design
 
 ROOT = Path(__file__).resolve().parent.parent
 DEMO, PICTURE = ROOT / "out" / "demo", ROOT / "docs" / "idea.png"
@@ -137,11 +139,11 @@ def body(design, law):
     """(things to render, points, words, limits of the colour bar or None) of the demo's body."""
     path = DEMO / "solve" / "solution.pvd"
     if not path.exists():
-        mesh = body_mesh(design.manipulator, design.pressure, law, design.base_pose)
+        mesh = body_mesh(design, design.pressure, law)
         return painted(mesh), mesh.points, "outline carried by the rod", None
     surface, (lines, _) = deformed_surface(read_solution(path), design.base_pose)
-    limits = (1.0, float(np.percentile(surface.point_data["mean_stretch"], 99)))
-    return [lit(surface, "mean_stretch", limits), (lines, EDGES)], surface.points, "finite elements", limits
+    limits = (1.0, float(np.percentile(surface.point_data[MEAN_STRETCH], 99)))
+    return [lit(surface, MEAN_STRETCH, limits), (lines, EDGES)], surface.points, "finite elements", limits
 
 
 def colour_bar(fig, place, limits, label, extend="neither"):
@@ -158,7 +160,7 @@ def main():
     law, segment = shipped_law(), CASES["one_sided_w10"](ANGLE, 1)
     surface, states = solved_cell(segment)
     design = demo_design()
-    line = predict(design.manipulator, design.pressure, law, base_pose=design.base_pose)
+    line = predict_design(design, design.pressure, law)
     things, points, words, limits = body(design, law)
 
     # base first, tip last: the camera looks across the way from one to the other

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pneunet.base import se3
 from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.kinds import DESIGN, read_tables
@@ -36,10 +37,10 @@ class DesignFile(Checked):
 
     pressure in MPa: one for all, or a tuple of one for each group of segments; base_pose (4, 4): the base
     frame in the target's coordinates (mm); mesh_size in mm; element: hexahedra of a grid or tetrahedra of
-    gmsh's; target: text that names the target file; result: free table of numbers that `pneunet design` adds
-    and nobody reads back. loads, control, measure and contact ('auto': walls of neighbouring chambers that
-    touch are held apart; 'none': they are not) are for the finite elements alone; a pressure of 0 everywhere
-    goes with loads only.
+    gmsh's; target: text that names the target file; result: free table of what `pneunet design` adds, for
+    people: its split and active bounds alone are read back. control, measure and contact ('auto': walls of
+    neighbouring chambers that touch are held apart; 'none': they are not) are for the finite elements alone;
+    a pressure of 0 everywhere goes with loads only.
     """
 
     manipulator: Manipulator
@@ -160,7 +161,7 @@ def _base_pose(table, where):
             part[...] = array(table[key], key, where, f"numbers of shape {shape}", shape)
             if (abs(part) > FARTHEST).any():
                 raise InputError(f"{where}: '{key}' must be numbers up to {FARTHEST:g} in size")
-    if abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max() > 1e-6 or np.linalg.det(pose[:3, :3]) < 0:
+    if not se3.is_pose(pose):
         raise InputError(f"{where}: 'rotation' is not a rotation matrix")
     return pose
 

@@ -1,4 +1,5 @@
-"""Rectangles of a segment's cross-section in the body's axes, where its roll has turned them."""
+"""Rectangles of a segment's cross-section in the body's axes, where its roll has turned them, and plans of
+its chambers."""
 
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,16 @@ def channel_section(segment: "Segment") -> np.ndarray:
 def whole_section(segment: "Segment") -> np.ndarray:
     """(2, 2) lowest and highest y and z of all there is, chambers included, mm."""
     return _turned(segment, segment.width / 2, segment.chamber_bottom, segment.chamber_top)
+
+
+def chamber_plan(
+    segment: "Segment", x: float, thickness: float, half_width: float, side: int = 1
+) -> np.ndarray:
+    """Plan corners (4, 2) in mm of a chamber, cavity or gap centred at x, `thickness` (mm) normal to it and
+    between y = -half_width and half_width; side -1: turned half a turn about x."""
+    half, slant = thickness / segment.sin / 2, segment.cot * half_width * side
+    x0, x1, y = x - slant, x + slant, half_width
+    return np.array([[x0 - half, -y], [x0 + half, -y], [x1 + half, y], [x1 - half, y]])
 
 
 def _turned(segment, half_width, z0, z1):

@@ -59,8 +59,7 @@ def mesh(a: Namespace) -> None:
 def export(a: Namespace) -> None:
     from pneunet.front import read_design
 
-    folder = a.design if a.design.is_dir() else a.design.parent
-    read_design(a.design).export(a.output or folder, a.moulds)
+    read_design(a.design).export(a.output or a.design.parent, a.moulds)
 
 
 def _load_finite_elements(command):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import InputError
+from pneunet.base import se3
 from pneunet.base.files.toml import from_table
 from pneunet.base.materials.fit_run import run_fit
 from pneunet.base.materials.fitting import Fit
@@ -109,12 +109,7 @@ def rod(
 
 def _pose(given):
     """A base's frame (4, 4), or None; InputError for anything else."""
-    pose = np.eye(4) if given is None else np.asarray(given)
-    finite = pose.shape == (4, 4) and pose.dtype.kind in "fi" and np.isfinite(pose).all()
-    R = pose[:3, :3] if finite else np.zeros((3, 3))
-    if abs(R.T @ R - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0 or (pose[3] != [0, 0, 0, 1]).any():
-        raise InputError("base_pose must be (4, 4): a rotation, an origin in mm, and a last row 0, 0, 0, 1")
-    return given
+    return None if given is None else se3.checked_pose(given, "base_pose")
 
 
 def report(directory: str | Path, law: str | SegmentLaw | None = None) -> Path:

@@ -9,6 +9,9 @@ import pytest
 from docs.site.blocks import blocks, pages
 from docs.site.check import faults
 from docs.site.run import MADE, WrongBlock, run_page
+from pneunet.design.search.space import RANGES as VARIED
+from pneunet.geometry.parameters import ONE_SIDED, PASSIVE, TWISTING
+from pneunet.hifi.runs.campaign.sample import RANGES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = pages()
@@ -178,3 +181,21 @@ def test_the_reference_has_every_name_of_the_front_door():
 
     named = re.findall(r"^::: pneunet\.([\w.]+)$", (ROOT / "docs" / "api.md").read_text(), re.M)
     assert sorted(named) == sorted(f"{place}.{name}" for name, place in pneunet._PLACES.items())
+
+
+def table(page, header):
+    """{first cell: (two numbers)} of the table of a page whose header row has these cells first."""
+    rows = (ROOT / "docs" / page).read_text().partition(f"| {' | '.join(header)} |")[2].split("\n\n")[0]
+    cells = ([c.strip(" `") for c in row.split("|")[1:4]] for row in rows.splitlines()[2:])
+    return {key: tuple(float(value.split()[0]) for value in both) for key, *both in cells}
+
+
+def test_tables_of_ranges_are_those_of_the_code():
+    every = RANGES[ONE_SIDED] | RANGES[TWISTING]
+    assert table("rod-law.md", ("key", "from", "to")) == every
+    told, bounds = table("use-design.md", ("dimension", "from", "to")), {}
+    for kind in (ONE_SIDED, TWISTING, PASSIVE):
+        bounds |= {name: both for name, (both, _) in VARIED[kind].items()}
+    told = {key.partition(" (")[0].replace(" ", "_"): both for key, both in told.items()}
+    told["plain_length"] = told.pop("length_of_a_passive_segment")
+    assert told == bounds

@@ -30,6 +30,9 @@ CENTRELINES = ("step", "pressure_kPa", *CENTRELINE, *MARKS)
 SEGMENTS = ("step", "pressure_kPa", "segment", *STRAINS, *MARKS)
 WALLS = ("segment", "side", "gap", "gap_mm", "distance_mm")
 
+#: of a solve's fields: the files of its steps, and the stretch of the elements around a node
+STEP_FILES, MEAN_STRETCH = "step_*.vtu", "mean_stretch"
+
 #: cell.csv
 CELL = (
     *("pressure_kPa", "volume_mm3", *STRAINS, *INVARIANTS),
@@ -45,6 +48,11 @@ CASE = ("case",)
 ENDING = ("status", "reason", "case_seconds", "case_memory_MB")
 #: columns of words, whatever these look like
 WORDS = {"case", "side", "warnings", "status", "reason"}
+
+
+def step_file(number: int) -> str:
+    """The name of a step's file, one of STEP_FILES."""
+    return STEP_FILES.replace("*", f"{number:04d}")
 
 
 def read_table(path: str | Path, numbers: Sequence[str] = ()) -> np.ndarray:

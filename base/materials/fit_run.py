@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.errors import InputError, located
-from pneunet.base.files.atomic import atomic_path, write_text
+from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.fitting import Fit, TensileData, biaxial_spread, fit
 from pneunet.base.materials.hyperelastic import nominal_stress
 from pneunet.base.materials.laws import LAWS, Hyperelastic, material_to_table
 from pneunet.base.materials.tensile import Specimen, read_tensile
+from pneunet.base.pictures.rendering import figure, save
 from pneunet.base.progress import progress
 from pneunet.base.units import KPA_PER_MPA
 
@@ -130,17 +131,12 @@ def draw(
 ) -> None:
     """Data and fits, residuals, and what the laws say of equibiaxial tension; nominal stress against
     stretch."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 5.2), layout="constrained")
-    grid = figure.add_gridspec(2, 2, height_ratios=(3, 1))
+    sheet = figure(11, 5.2, "constrained")
+    grid = sheet.add_gridspec(2, 2, height_ratios=(3, 1))
     fitted, residual, biaxial = (
-        figure.add_subplot(grid[0, 0]),
-        figure.add_subplot(grid[1, 0]),
-        figure.add_subplot(grid[:, 1]),
+        sheet.add_subplot(grid[0, 0]),
+        sheet.add_subplot(grid[1, 0]),
+        sheet.add_subplot(grid[:, 1]),
     )
     for s in specimens:
         near = s.stretch <= 1 + 1.15 * (tests.largest - 1)
@@ -179,5 +175,4 @@ def draw(
     )
     fitted.legend(title="law, relative RMS error")
     biaxial.legend()
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=130)
+    save(sheet, path, 130)

@@ -8,7 +8,7 @@ here and a name in LAWS.
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -299,8 +299,8 @@ LAWS: dict[str, type[Hyperelastic]] = {cls.law: cls for cls in (NeoHookean, Moon
 
 def of_modulus(material: One, mu: float) -> One:
     """The material with all of its moduli in proportion, so that its shear modulus at rest is mu (MPa)."""
-    own, share = [f for f in fields(material) if f.name in material.parameters], mu / material.mu
-    moduli = [f.name for f in own if f.metadata["unit"] == "MPa"]
+    share = mu / material.mu
+    moduli = [f.name for f in quantities(type(material)).values() if f.metadata["unit"] == "MPa"]
     return replace(material, **{name: share * getattr(material, name) for name in moduli})
 
 

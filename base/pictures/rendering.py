@@ -48,11 +48,12 @@ def _image_axes(elevation, azimuth):
     return right, np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
 
 
-def figure(width: float, height: float) -> Any:
-    """A matplotlib Figure (inches) with the Agg canvas: no window, no global state."""
+def figure(width: float, height: float, layout: Any = None) -> Any:
+    """A matplotlib Figure (inches) with the Agg canvas: no window, no global state. layout: as matplotlib's,
+    'constrained' for one that makes room for labels and legends."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), facecolor="white")
+    return Figure(figsize=(width, height), facecolor="white", layout=layout)
 
 
 def save(figure: Any, path: str | Path, dpi: float = 120) -> None:

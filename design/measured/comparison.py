@@ -12,9 +12,8 @@ from pneunet.base.errors import InputError, located
 from pneunet.base.files.atomic import write_csv
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
-from pneunet.base.materials.laws import Hyperelastic
+from pneunet.base.materials.laws import of_modulus
 from pneunet.base.pictures import rendering
-from pneunet.base.quantities import quantities
 from pneunet.base.units import KPA_PER_MPA, LARGEST_PRESSURE_KPA, MPA_PER_KPA
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.measured.fit import CastingFit, fit_casting
@@ -176,8 +175,9 @@ class MeasuredComparison:
         segments = [
             replace(
                 s,
-                material=_times(s.material, change.modulus),
-                layer_material=None if s.layer_material is None else _times(s.layer_material, change.modulus),
+                material=of_modulus(s.material, change.modulus * s.material.mu),
+                layer_material=s.layer_material
+                and of_modulus(s.layer_material, change.modulus * s.layer_material.mu),
             )
             for s in body.segments
         ]
@@ -367,12 +367,6 @@ def _places(measured: Measurement, design: Design, markers) -> np.ndarray:
                 " marker, x_mm, y_mm, z_mm on the body at rest ('tip' and 'base' need none)"
             )
     return np.array([lower[name.lower()] for name in measured.names])
-
-
-def _times(material: Hyperelastic, factor: float) -> Hyperelastic:
-    """The material with every modulus times a factor."""
-    moduli = [f.name for f in quantities(type(material)).values() if f.metadata["unit"] == "MPa"]
-    return replace(material, **{name: getattr(material, name) * factor for name in moduli})
 
 
 def run_compare(

@@ -16,7 +16,7 @@ from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import PASSIVE, Manipulator, Segment
 from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SectionLaw, SegmentLaw
-from pneunet.reduced.rod.rod import Rod
+from pneunet.reduced.rod.prediction import predict
 
 #: mm between the points of a predicted centreline
 SPACING = 2.0
@@ -103,8 +103,8 @@ class Predicted:
             laws: SegmentLaw | list[SegmentLaw] = self.law
             if shifts is not None:
                 laws = [ShiftedLaw(self.law, shift) for shift in shifts[i]]
-            rod = Rod.of(body, laws, self._scaled(pressure / f), self.design.base_pose)
-            found.append(rod.equilibrium(over).line if loads else rod.free(SPACING))
+            level = self._scaled(pressure / f)
+            found.append(predict(body, level, laws, SPACING, self.design.base_pose, over))
         return found
 
     def line(self, pressure: float, change: Change = Change()) -> Centreline | None:

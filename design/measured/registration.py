@@ -4,23 +4,21 @@ belong."""
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.frames import best_rigid_fit
 
 #: markers count as lying on a line when they leave it by less than this share of its length
 ON_A_LINE = 0.02
 
 
 def register(measured: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Pose (4, 4) that moves points (k, 3) closest to others (k, 3), in least squares (Kabsch 1976).
+    """Pose (4, 4) that moves points (k, 3) closest to others (k, 3), in least squares.
 
     What points on a line leave open is the turn about that line: there it is the smallest one.
     """
+    if line_of(wanted) is None:
+        return best_rigid_fit(measured, wanted, np.ones(len(wanted)))
     a, b = measured.mean(axis=0), wanted.mean(axis=0)
-    u, _, vt = np.linalg.svd((measured - a).T @ (wanted - b))
-    if line_of(wanted) is not None:
-        return _shortest(measured - a, wanted - b, a, b)
-    sign = np.sign(np.linalg.det(u @ vt))
-    R = (u @ np.diag([1.0, 1.0, sign]) @ vt).T
-    return se3.make_pose(R, b - R @ a)
+    return _shortest(measured - a, wanted - b, a, b)
 
 
 def line_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

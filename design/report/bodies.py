@@ -1,7 +1,7 @@
 """Bodies to render: the reduced model's, the finite elements', curves as tubes (base.pictures.rendering makes
 pictures of them)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -18,8 +18,10 @@ from pneunet.base.pictures.walls import FIELD
 from pneunet.design.report.comparison import Comparison
 from pneunet.design.report.labels import TARGET, rgb, segment_colour
 from pneunet.design.report.rundata import DesignFolder
-from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.designfile import DesignFile
+from pneunet.geometry.loading import DeadLoads
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.prediction import predict_design
 
 if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
@@ -35,15 +37,15 @@ def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple
     return pyvista.lines_from_points(np.asarray(points, float)).tube(radius=radius), {"color": colour}
 
 
-def body_mesh(
-    manipulator: Manipulator, pressure: ArrayLike, law: SegmentLaw, base_pose: np.ndarray | None
-) -> "PolyData":
-    """The reduced model's body (pyvista.PolyData, mm, target coordinates), cell data "segment" 1.. ."""
+def body_mesh(design: DesignFile, pressure: float | ArrayLike, law: SegmentLaw) -> "PolyData":
+    """The reduced model's body at a pressure (MPa), of one group of segments or each (pyvista.PolyData, mm,
+    target coordinates), cell data "segment" 1.. ."""
     import pyvista
 
     from pneunet.reduced.rod.outline import body_surface
 
-    vertices, quads, segments = body_surface(manipulator, pressure, law, base_pose=base_pose)
+    line = predict_design(design, pressure, law)
+    vertices, quads, segments = body_surface(design.manipulator, line)
     mesh = pyvista.PolyData(vertices, np.column_stack([np.full(len(quads), 4), quads]).ravel())
     mesh.cell_data["segment"] = segments + 1
     return mesh
@@ -129,10 +131,10 @@ class Scene:
         design, solve, reduced, solved = run.design, run.solve, None, None
         pressure = design.pressure if solve is None else design.scaled(solve.pressure)
         if (comparison.reduced if solve is None else comparison.reduced_at_solve) is not None:
-            reduced = body_mesh(design.manipulator, pressure, law, design.base_pose)
+            reduced = body_mesh(design, pressure, law)
         if solve is not None and solve.solution is not None:
             solved = deformed_surface(read_solution(solve.solution), design.base_pose)
-        rest = body_mesh(design.manipulator, 0.0, law, design.base_pose)
+        rest = body_mesh(replace(design, loads=DeadLoads()), 0.0, law)
         held = [np.asarray(body.points) for body in (reduced, solved and solved[0]) if body is not None]
         held += [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
         return cls(reduced, rest, solved, view_of(np.vstack(held or [rest.points])))

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pneunet.base import se3
-from pneunet.base.errors import ConvergenceError
+from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report.labels import kPa, plain, significant
@@ -14,7 +14,7 @@ from pneunet.design.report.rundata import DesignFolder
 from pneunet.design.target.metrics import Errors, compare
 from pneunet.geometry.designfile import DesignFile
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.prediction import doubts, predict, segment_strains
+from pneunet.reduced.rod.prediction import doubts, predict_design, segment_strains
 
 #: how far prediction and finite elements may be apart before the verdict looks for a cause: % of length (RMS
 #: of points paired by arc length), % of the largest |k| of a segment
@@ -50,10 +50,10 @@ class Comparison:
         design = run.design
         doubted = doubts(design.manipulator, [design.pressure], law)
         notes = [f"The law '{law.name}' of the reduced model is in doubt: {text}." for text in doubted]
-        solved = at_solve = strains = None
+        solved = at_solve = None
         reduced = _predict(design, design.pressure, law, notes)
         if run.centreline is not None and reduced is not None:
-            difference = compare(run.centreline[1], reduced)
+            difference = compare(run.centreline[1], reduced.points)
             if difference.hausdorff > 1e-3 * difference.reference_length:
                 notes.append(
                     f"centreline.csv differs by up to {difference.hausdorff:.2f} mm from what the model gives"
@@ -78,18 +78,16 @@ class Comparison:
                     f"{kPa(design.pressure)}. It is compared with the reduced model at {last}; "
                     "its distance to the target is that of a body not fully inflated."
                 )
-            pressure = design.scaled(run.solve.pressure)
-            at_solve = _predict(design, pressure, law, notes)
-            if at_solve is not None:
-                strains = segment_strains(design.manipulator, pressure, law)
+            at_solve = _predict(design, design.scaled(run.solve.pressure), law, notes)
+        points, there = (None if line is None else line.points for line in (reduced, at_solve))
         return cls(
-            reduced,
-            at_solve,
-            strains,
+            points,
+            there,
+            None if at_solve is None else segment_strains(design.manipulator, at_solve),
             solved,
-            _errors(reduced, run.target),
+            _errors(points, run.target),
             _errors(solved, run.target),
-            _errors(at_solve, solved),
+            _errors(there, solved),
             tuple(dict.fromkeys(notes)),
             nearest,
             bool(doubted),
@@ -100,9 +98,7 @@ def _loading(run):
     """Sentences on what acted in the finite elements beside a growing pressure."""
     record, notes = run.solve.record, []
     if run.design.loads:
-        notes.append(
-            f"Dead loads act in the finite elements, {run.design.loads.text()}; the reduced model knows none."
-        )
+        notes.append(f"Dead loads act: {run.design.loads.text()}.")
     if record.get("control", "pressure") != "pressure":
         notes.append(
             f"The finite elements were walked by {record['control']}: their last pressure is not one that was"
@@ -138,8 +134,8 @@ def stopped_short(run: DesignFolder) -> bool:
 
 def _predict(design, pressure, law, notes):
     try:
-        return predict(design.manipulator, pressure, law, base_pose=design.base_pose).points
-    except ConvergenceError as error:
+        return predict_design(design, pressure, law)
+    except (ConvergenceError, InputError) as error:  # a law of free shapes refuses loads
         notes.append(f"The reduced model has no solution at {kPa(pressure)}: {error}")
         return None
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pneunet.base.files.atomic import atomic_path
+from pneunet.base.pictures import rendering
 from pneunet.design.report.dimensions import INK, SheetView
 from pneunet.design.report.labels import REDUCED, kPa, material_names, plain, segment_colour, segment_mode
 from pneunet.design.report.section_views import cross_section, normal_section, section_groups, section_scale
 from pneunet.geometry.designfile import DesignFile
-from pneunet.geometry.parameters import TWISTING, Manipulator, Segment
-from pneunet.geometry.sections import whole_section
+from pneunet.geometry.parameters import TWISTING, Manipulator
+from pneunet.geometry.sections import chamber_plan, whole_section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,30 +78,13 @@ def segment_table(manipulator: Manipulator) -> list[tuple[str, list[str]]]:
     ]
 
 
-def chamber_plan(
-    segment: Segment, x: float, thickness: float, half_width: float, side: int
-) -> list[tuple[float, float]]:
-    """Four plan corners in mm of a chamber or cavity centred at x; side -1: turned half a turn about x."""
-    half, slant = thickness / segment.sin / 2, segment.cot * half_width * side
-    return [
-        (x - slant - half, -half_width),
-        (x - slant + half, -half_width),
-        (x + slant + half, half_width),
-        (x + slant - half, half_width),
-    ]
-
-
 def draw_drawing(design: DesignFile, path: str | Path) -> None:
     """Write the drawing of a DesignFile as a PNG (or SVG, PDF: by the suffix of `path`)."""
-    figure = drawing_figure(design)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=130)
+    rendering.save(drawing_figure(design), path, 130)
 
 
 def drawing_figure(design: DesignFile) -> "Figure":
     """The drawing as a matplotlib Figure, `SHEET_WIDTH` inches wide and as high as its content."""
-    from matplotlib.figure import Figure
-
     manipulator = design.manipulator
     groups = section_groups(manipulator)
     rows = segment_table(manipulator)
@@ -117,7 +100,7 @@ def drawing_figure(design: DesignFile) -> "Figure":
     place = len(panels) + (len(panels) % COLUMNS == COLUMNS - 1)  # of the table, as wide as two
     panel_rows = -(-(place + 2) // COLUMNS)
     height = 2 * MARGIN + 0.75 + plan_height + side_height + panel_rows * PANEL_HEIGHT + 0.65
-    figure = Figure(figsize=(SHEET_WIDTH, height), facecolor="white")
+    figure = rendering.figure(SHEET_WIDTH, height)
     _frame(figure, design, height)
 
     top = height - MARGIN - 0.75

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.errors import ConvergenceError
+from pneunet.base import se3
+from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.files.schemas import MEAN_STRETCH
 from pneunet.base.pictures import rendering
 from pneunet.base.pictures.rendering import figure, save
 from pneunet.base.pictures.walls import EVENLY_LIT, TOUCHING, draw_walls
@@ -12,17 +14,15 @@ from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
 from pneunet.design.report import bodies
 from pneunet.design.report.bodies import Scene
 from pneunet.design.report.comparison import Comparison
-from pneunet.design.report.drawing import chamber_plan
 from pneunet.design.report.labels import FINITE_ELEMENTS, STYLES, kPa, segment_colour, significant
 from pneunet.design.report.pictures import curve_panels, legend, segment_bands
 from pneunet.design.report.rundata import DesignFolder, Solution
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Manipulator
-from pneunet.reduced import predict
+from pneunet.geometry.sections import chamber_plan
 from pneunet.reduced.rod.laws import SegmentLaw
+from pneunet.reduced.rod.prediction import predict_design
 
-#: point data of the elements around a node (hifi.runs.solve.fields)
-MEAN_STRETCH = "mean_stretch"
 #: file, point data, in words, unit, percentile at which the scale ends: corners are singular for the stretch
 FIELDS = (
     ("fe_displacement.png", "displacement length", "displacement", " mm", 100),
@@ -139,9 +139,10 @@ def history_picture(
     levels, tips = np.linspace(0, p.max(), 15), []
     for level in levels:
         try:
-            tips.append(predict(design.manipulator, design.scaled(level * MPA_PER_KPA), law).points[-1])
-        except ConvergenceError:
+            line = predict_design(design, design.scaled(level * MPA_PER_KPA), law)
+        except (ConvergenceError, InputError):
             break
+        tips.append(se3.transform(se3.inverse_pose(design.base_pose), line.points[-1]))
     for i, (name, colour) in enumerate(zip("xyz", ("#1f6fb2", "#2f9e44", "#d9480f"))):
         axes[0, 0].plot(
             p,

@@ -9,6 +9,7 @@ import numpy as np
 
 from pneunet.base import se3
 from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.files.schemas import MEAN_STRETCH, step_file
 from pneunet.base.pictures.walls import FIELD
 from pneunet.base.progress import progress
 from pneunet.base.units import KPA_PER_MPA
@@ -18,14 +19,14 @@ from pneunet.design.report.rundata import DesignFolder
 from pneunet.geometry.designfile import DesignFile
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.outline import body_surface
-from pneunet.reduced.rod.prediction import predict
+from pneunet.reduced.rod.prediction import predict_design
 
 if TYPE_CHECKING:
     from pyvista import UnstructuredGrid
 
 #: point data -> (what it is, with its unit; factor to that unit; colours, as matplotlib and plotly call them)
 FIELDS = {
-    "mean_stretch": ("largest principal stretch", 1.0, "viridis"),
+    MEAN_STRETCH: ("largest principal stretch", 1.0, "viridis"),
     FIELD: ("distance of facing walls, mm", 1.0, "RdYlBu"),
     "pressure": ("pressure in the silicone, kPa", KPA_PER_MPA, "RdBu"),
 }
@@ -81,8 +82,8 @@ def load_steps(run: DesignFolder, law: SegmentLaw, corners: bool = False) -> Loa
     if solve is None or solve.solution is None:
         return _reduced(run.design, run.target, law)
     files = listed_steps(solve.solution)
-    pressures = {f"step_{int(row['step']):04d}.vtu": row["pressure_kPa"] for row in solve.steps}
-    lines = {f"step_{i:04d}.vtu": points for i, (_, _, points) in enumerate(solve.history, start=1)}
+    pressures = {step_file(int(row["step"])): row["pressure_kPa"] for row in solve.steps}
+    lines = {step_file(i): points for i, (_, _, points) in enumerate(solve.history, start=1)}
     rest = np.column_stack([solve.s, np.zeros((len(solve.s), 2))])
     pose, labels, points, shown_lines = run.design.base_pose, [], [], []
     fields: dict[str, list[np.ndarray]] = {}
@@ -128,14 +129,19 @@ def outer_surface(grid: "UnstructuredGrid", corners: bool = False) -> tuple[np.n
 
 
 def _reduced(design: DesignFile, target: np.ndarray | None, law: SegmentLaw) -> LoadSteps:
-    labels, points, lines, triangles = [], [], [], np.zeros((0, 3), int)
+    labels: list[str] = []
+    points: list[np.ndarray] = []
+    lines: list[np.ndarray] = []
+    triangles = np.zeros((0, 3), int)
     for share in np.linspace(0, 1, REDUCED_STEPS + 1):
         pressure = design.scaled(share * design.largest_pressure)
         try:
-            vertices, quads, _ = body_surface(design.manipulator, pressure, law, SPACING, design.base_pose)
-            line = predict(design.manipulator, pressure, law, SPACING, design.base_pose)
+            line = predict_design(design, pressure, law, SPACING)
         except ConvergenceError:
+            if not points:
+                raise
             break
+        vertices, quads, _ = body_surface(design.manipulator, line, SPACING)
         triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
         points.append(vertices)
         lines.append(line.points)

@@ -1,9 +1,11 @@
-"""Pieces of a report's page."""
+"""Pieces of a page: of a report, of a workshop sheet."""
 
 import base64
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
+
+from pneunet.base.files.record import revision
 
 STYLE = """
 :root { color-scheme: light; }
@@ -43,6 +45,16 @@ footer { margin-top: 2rem; font-size: .85rem; color: #6b747d; }
   .table { overflow: visible; }
 }
 """
+
+
+def document(title: str, body: str, units: str, style: str = "") -> str:
+    """A page with this title, body and remark on its units; style: CSS after STYLE."""
+    return (
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{STYLE}{style}</style></head><body>{body}"
+        f"<footer>pneunet, revision {escape(revision())}. {units}</footer></body></html>\n"
+    )
 
 
 def image(folder: Path, name: str, caption: str) -> str:

@@ -10,7 +10,6 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
-from pneunet.base.files.record import revision
 from pneunet.base.progress import Pace
 from pneunet.base.system.libraries import load_vtk
 from pneunet.base.units import KPA_PER_MPA
@@ -26,7 +25,7 @@ from pneunet.design.report.comparison import (
 )
 from pneunet.design.report.drawing import draw_drawing, segment_table
 from pneunet.design.report.labels import kPa, material_names, plain, segment_name, signed, significant
-from pneunet.design.report.page import STYLE, folded, grid, image, missing, table
+from pneunet.design.report.page import document, folded, grid, image, missing, table
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.report.viewing import framed
 from pneunet.reduced.choice import choose_law
@@ -71,15 +70,8 @@ def _write(run, law, folder):
     for number, (title, content) in enumerate(sections, start=1):
         body += f"<section><h2>{escape(title)}</h2>{content()}</section>"
         log.info(f"  {title.lower()}{pace.left(number / len(sections)) * (number < len(sections))}")
-    page = (
-        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(run.design.name)}: pneunet report</title><style>{STYLE}</style></head><body>{body}"
-        f"<footer>pneunet report, revision {escape(revision())}. Lengths in mm, pressures in kPa.</footer>"
-        "</body></html>\n"
-    )
     path = run.directory / "report.html"
-    write_text(path, page)
+    write_text(path, document(f"{run.design.name}: report", body, "Lengths in mm, pressures in kPa."))
     log.info(verdict(run, comparison))
     log.info(f"report: {path}")
     return path

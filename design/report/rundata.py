@@ -11,7 +11,7 @@ import numpy as np
 from pneunet.base.errors import InputError
 from pneunet.base.files import schemas
 from pneunet.base.files.record import read_record
-from pneunet.base.files.schemas import read_table
+from pneunet.base.files.schemas import STEP_FILES, read_table
 from pneunet.base.quantities import LARGEST_NUMBER, shown
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA
@@ -71,7 +71,7 @@ class Solution:
     @property
     def fields(self) -> list[Path]:
         """ParaView's files, one a step, in order; pyvista.read opens them."""
-        return sorted(self.solution.parent.glob("step_*.vtu")) if self.solution else []
+        return sorted(self.solution.parent.glob(STEP_FILES)) if self.solution else []
 
     @property
     def walls_overlap(self) -> bool:

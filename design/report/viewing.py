@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pneunet.base.errors import InputError
+from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.pictures.rendering import camera_angles
@@ -77,7 +77,7 @@ def framed(run: DesignFolder, law: SegmentLaw) -> str:
         content = page(_that_fit(run, law))
     except ModuleNotFoundError:
         return missing("To turn the body here: pip install 'pneunet[view]', then the report again.")
-    except InputError as error:
+    except (ConvergenceError, InputError) as error:
         return missing(f"No body to turn: {error}")
     return (
         f'<iframe class="turn" srcdoc="{escape(content)}" title="the body, to turn" loading="lazy"></iframe>'

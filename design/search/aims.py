@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.curve import nearest_on
 from pneunet.design.target.shapes import TargetShape
 from pneunet.design.target.target import Target
 from pneunet.reduced.rod.placing import PlacedRod, Stations
@@ -111,9 +112,5 @@ class Aim:
 def _nearest(line, fractions, points):
     """Fractions (n,) of the points of a polyline (m, 3), known at its vertices (m,), nearest to points
     (n, 3)."""
-    start, step = line[:-1], np.diff(line, axis=0)
-    squared = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
-    along = np.clip(np.einsum("nmk,mk->nm", points[:, None] - start, step) / squared, 0, 1)
-    apart = np.sum((points[:, None] - start - along[..., None] * step) ** 2, axis=2)
-    best = np.argmin(apart, axis=1)
-    return fractions[best] + along[np.arange(len(points)), best] * np.diff(fractions)[best]
+    edge, share = nearest_on(line, points)
+    return fractions[edge] + share * np.diff(fractions)[edge]

@@ -7,7 +7,8 @@ from math import comb
 
 from pneunet.base.errors import InputError
 from pneunet.design.target.extraction import Extracted
-from pneunet.design.target.target import PASSIVE, Target
+from pneunet.design.target.target import Target
+from pneunet.geometry.parameters import PASSIVE
 
 #: each is a search of its own
 MOST = 12

@@ -11,7 +11,8 @@ from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.search.space import limits, prototype
 from pneunet.design.target.extraction import Extracted
 from pneunet.design.target.reach import ANGLES, Reach, reach
-from pneunet.design.target.target import BENDING, PASSIVE, PRESSURE_LIMIT, Target
+from pneunet.design.target.target import BENDING, PRESSURE_LIMIT, Target
+from pneunet.geometry.parameters import PASSIVE
 from pneunet.reduced.rod.laws import SegmentLaw
 
 #: not dimensions of the cells

@@ -14,8 +14,8 @@ from pneunet.design.segmentation.windows import arc_lengths
 from pneunet.design.target.extraction import Extracted, extract
 from pneunet.design.target.points import STRIDE, strides
 from pneunet.design.target.reach import ANGLES, reach
-from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, PRESSURE_LIMIT, Target
-from pneunet.geometry.parameters import TWISTING
+from pneunet.design.target.target import BENDING, HELICAL, PRESSURE_LIMIT, Target
+from pneunet.geometry.parameters import PASSIVE, TWISTING
 from pneunet.reduced.rod.laws import SegmentLaw
 
 GIVEN_NOTE, FOUND_NOTE = "split given by the user", "automatic split"

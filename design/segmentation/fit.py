@@ -14,8 +14,8 @@ import numpy as np
 
 from pneunet.base import se3
 from pneunet.design.segmentation.rod import PiecewiseRod, Station
-from pneunet.design.target.target import BENDING, HELICAL, PASSIVE
-from pneunet.geometry.parameters import TWISTING
+from pneunet.design.target.target import BENDING, HELICAL
+from pneunet.geometry.parameters import PASSIVE, TWISTING
 
 LEVER = 5.0  # mm, half a usual width, at which turns of a section frame are measured
 STRAIN = 0.03  # 1/mm, standard deviation of strains before any point is seen

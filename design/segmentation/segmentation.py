@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -66,6 +67,13 @@ def piece_tables(rows: Sequence[Mapping]) -> str:
         values = (f'"{row[key]}"' if key == "kind" else f"{row[key]:.7g}" for key in keys)
         texts.append("[[piece]]\n" + "".join(f"{key} = {value}\n" for key, value in zip(keys, values)))
     return "\n".join(texts)
+
+
+def is_piece_row(row: object) -> bool:
+    """Whether it is a row of `piece_tables`."""
+    if not isinstance(row, dict) or row.get("kind") not in tuple(PIECE_KEYS):
+        return False
+    return all(isinstance(row[key], Real) for key in KEYS if key in row and key != "kind")
 
 
 def _row(piece):

@@ -7,8 +7,8 @@ import numpy as np
 
 from pneunet.base.units import PER_MM_PER_M
 from pneunet.design.segmentation.fit import RodFit, refined
-from pneunet.design.target.target import PASSIVE, Piece, SplitOptions, Target
-from pneunet.geometry.parameters import TWISTING
+from pneunet.design.target.target import Piece, SplitOptions, Target
+from pneunet.geometry.parameters import PASSIVE, TWISTING
 
 AT_LIMIT = 0.01  # of a limit: a strain so near sits on it
 NOTED = 4.0  # standard deviations of squares beyond which the points are said to lie off the rod

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from pneunet.base.errors import InputError
 from pneunet.base.materials.silicones import measured_silicone
 from pneunet.base.quantities import Checked, quantity
@@ -44,8 +42,3 @@ class Casting(Checked):
             measured_silicone(name)
         if self.silicones and self.moduli is not None:
             raise InputError("silicones and mu_range_MPa exclude each other: give one")
-
-    def on_grid(self, value: float | np.ndarray, angle: bool = False) -> float | np.ndarray:
-        """A dimension (mm), or an angle (degrees), on the nearest multiple of its grid."""
-        step = self.angle_grid if angle else self.grid
-        return np.round(np.round(np.asarray(value) / step) * step, 9) if step else value

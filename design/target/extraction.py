@@ -17,8 +17,8 @@ from pneunet.base.curve import Curve
 from pneunet.base.frames import best_rigid_fit
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import PER_MM_PER_M
-from pneunet.design.target.target import BENDING, HELICAL, PASSIVE, Piece, Target
-from pneunet.geometry.parameters import TWISTING
+from pneunet.design.target.target import BENDING, HELICAL, Piece, Target
+from pneunet.geometry.parameters import PASSIVE, TWISTING
 
 FIT_POINTS = 31
 

@@ -11,25 +11,25 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError, located
 from pneunet.base.files.kinds import TARGET, read_tables
-from pneunet.base.files.toml import from_table, number, read_toml, refuse_unknown, vector
+from pneunet.base.files.toml import as_table, from_table, number, read_toml, refuse_unknown, vector
 from pneunet.base.materials.laws import PAPER_TWISTING, material_from_table
 from pneunet.base.quantities import Checked, quantities, quantity, shown
 from pneunet.base.strains import helix_frenet
 from pneunet.base.units import KPA_PER_MPA, MPA_PER_KPA, TO_INTERNAL
 from pneunet.design.target.casting import RANGES, Casting
+from pneunet.design.target.points import held_base
 from pneunet.design.target.shapes import TargetShape, TipPoints, guide_to
 from pneunet.design.target.table import PointsTable, read_points
 from pneunet.design.target.target import (
     BENDING,
     HELICAL,
-    PASSIVE,
     PRESSURE_LIMIT,
     Piece,
     SplitOptions,
     Target,
 )
 from pneunet.design.target.wrapfile import wrapped
-from pneunet.geometry.parameters import MOST_GROUPS, TWISTING, Segment
+from pneunet.geometry.parameters import MOST_GROUPS, PASSIVE, TWISTING, Segment
 
 #: targets that come along: octopus.toml, vase.toml, ...
 SHIPPED = Path(__file__).resolve().parents[1] / "data"
@@ -85,10 +85,12 @@ def _from_toml(path):
         table, folder = _on_shipped(table, path)
     where = str(path)
     shapes = _tables(table, "shape", where)
+    for i, row in enumerate(shapes, start=1):
+        refuse_unknown(row, SHAPE_KEYS, f"{where} [[shape]] {i}")
     if shapes and not _says_curve(table):  # the first shape is the one that is split
         table = table | shapes.pop(0)
     tip = _tip(table, folder, where)
-    base = dict(table.get("base", {}))
+    base = as_table(table.get("base", {}), f"{where} [base]")
     point, (direction, width) = _base_point(base, where), _base(base, f"{where} [base]")
     pieces = _pieces(table, where)
     if _says_curve(table) or tip is None:
@@ -113,7 +115,7 @@ def _from_toml(path):
         base_width=width,
         pressure_range=pressure_range,
         pressures=pressures,
-        groups=_groups(table, where),
+        groups=table.get("pressure_groups", 1),
         gravity=_gravity(table, where),
         shapes=tuple(_shape(row, folder, f"{where} [[shape]] {i}") for i, row in enumerate(shapes, start=1)),
         tip=tip,
@@ -178,7 +180,6 @@ def _tables(table, key, where):
 
 def _shape(row, folder, where):
     """A [[shape]]: a curve with its pressures."""
-    refuse_unknown(row, SHAPE_KEYS, where)
     if "pressure_kPa" not in row:
         raise InputError(
             f"{where}: key 'pressure_kPa' is missing: at which pressure is the body to be there?"
@@ -239,7 +240,7 @@ def _gravity(table, where):
 
 def _casting(table, where):
     """The Casting of [casting]."""
-    table, given = dict(table), {}
+    table, given = as_table(table, where), {}
     for key, (name, *_) in RANGES.items():
         if key in table:
             given[name] = _range(table.pop(key), key, where)
@@ -277,23 +278,16 @@ def _pressure(table, where):
         values = tuple(number(v, key, where) for v in (given if isinstance(given, list) else [given]))
     else:
         return None, ()
-    if not values or not all(0 < v <= KPA_PER_MPA * PRESSURE_LIMIT for v in values):
+    low = key == "pressure_range_kPa" and 0 in values[:1]  # a range may begin at rest
+    if not values or not all(0 < v <= KPA_PER_MPA * PRESSURE_LIMIT for v in values[low:]):
         raise InputError(
             f"{where}: {key} = {table[key]} must lie in 0..{KPA_PER_MPA * PRESSURE_LIMIT:g} kPa (above it the"
-            " chambers leak)"
+            " chambers leak), and not be 0"
         )
     pressures = tuple(MPA_PER_KPA * v for v in values)
     if key == "pressure_kPa" and len(pressures) > 1:
         return None, pressures
     return (pressures[0], pressures[-1]), ()
-
-
-def _groups(table, where):
-    count = table.get("pressure_groups", 1)
-    if type(count) is not int or not 1 <= count <= MOST_GROUPS:
-        told = f"pressure_groups = {shown(count)}"
-        raise InputError(f"{where}: {told} must be a whole number, 1..{MOST_GROUPS}")
-    return count
 
 
 def _range(value, key, where):
@@ -367,24 +361,9 @@ def _helix(given, where):
 def _base(table, where):
     """(direction, width) unit vectors or None."""
     refuse_unknown(table, ("direction", "width_direction"), where)
-    direction, width = (_unit_vector(table, key, where) for key in ("direction", "width_direction"))
-    if width is None:
-        return direction, None
-    if direction is None:
-        raise InputError(f"{where}: 'width_direction' needs 'direction' too")
-    if abs(direction @ width) > 1e-3:
-        raise InputError(f"{where}: 'width_direction' must be perpendicular to 'direction'")
-    width = width - (width @ direction) * direction
-    return direction, width / np.linalg.norm(width)
-
-
-def _unit_vector(table, key, where):
-    if key not in table:
-        return None
-    vector = _array([table[key]], key, where, 2)[0]
-    if vector.shape != (3,) or not 0 < np.linalg.norm(vector) < np.inf:
-        raise InputError(f"{where}: '{key}' must be three numbers, not all 0")
-    return vector / np.linalg.norm(vector)
+    names = "direction", "width_direction"
+    with located(where):
+        return held_base(table.get(names[0]), table.get(names[1]), names)
 
 
 def _start(table, where):

@@ -1,5 +1,6 @@
 """What points of a target must be: checks of points, frames and weights, whoever gives them."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,13 +31,41 @@ def check_curve(curve: Any) -> None:
         object.__setattr__(curve, name, values)
 
 
+def held_base(
+    direction: object, width: object, names: Sequence[str] = ("base_direction", "base_width")
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Unit vectors (3,) along a base and across it, from vectors of any length; None stays. InputError, by
+    these names, for vectors that are none or not perpendicular, and for the second one without the first."""
+    along, across = (None if v is None else _unit(v, name) for v, name in zip((direction, width), names))
+    if across is None:
+        return along, None
+    if along is None:
+        raise InputError(f"'{names[1]}' needs '{names[0]}' too")
+    if abs(along @ across) > 1e-3:
+        raise InputError(f"'{names[1]}' must be perpendicular to '{names[0]}'")
+    across = across - (across @ along) * along
+    return along, across / np.linalg.norm(across)
+
+
+def _unit(vector, name):
+    wanted = f"'{name}' must be three numbers, not all 0"
+    found = _floats(vector, wanted)
+    if found.shape != (3,) or not 0 < np.linalg.norm(found) < np.inf:
+        raise InputError(f"{wanted}, not {shown(vector)}")
+    return found / np.linalg.norm(found)
+
+
+def _floats(values: object, wanted: str) -> np.ndarray:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{wanted}, not {shown(values)}") from None
+
+
 def checked_points(points: object) -> np.ndarray:
     """Points as floats; InputError unless they are (n >= 4, 3), finite, without repeats, of a length that can
     be built, and neither closed nor folded back."""
-    try:
-        points = np.asarray(points, float)
-    except (TypeError, ValueError):
-        raise InputError(f"points must be rows of x, y, z in mm, not {shown(points)}") from None
+    points = _floats(points, "points must be rows of x, y, z in mm")
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"points must be rows of x, y, z in mm, not an array of shape {points.shape}")
     if len(points) < 4:
@@ -110,7 +139,7 @@ def strides(points: np.ndarray, stride: float) -> np.ndarray:
 
 def checked_weights(weights: object, count: int) -> np.ndarray:
     """Weights (count,) as floats; InputError unless they are finite and >= 0."""
-    weights = np.asarray(weights, float)
+    weights = _floats(weights, "weights must be numbers")
     if weights.shape != (count,):
         raise InputError(f"weights have shape {weights.shape}: {count} points need as many")
     bad = np.flatnonzero(~(np.isfinite(weights) & (weights >= 0)))
@@ -122,7 +151,7 @@ def checked_weights(weights: object, count: int) -> np.ndarray:
 def checked_frames(frames: object, points: np.ndarray) -> np.ndarray:
     """Frames (n, 3, 3) as floats; InputError unless they are right-handed, orthonormal and t1 points
     along."""
-    frames = np.asarray(frames, float)
+    frames = _floats(frames, "frames must be three vectors of three numbers each")
     if frames.shape != (len(points), 3, 3):
         raise InputError(f"frames have shape {frames.shape}: {len(points)} points need ({len(points)}, 3, 3)")
     if not np.isfinite(frames).all():

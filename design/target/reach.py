@@ -41,26 +41,24 @@ class Reach:
             self.strains.twist_per_deformed_length if self.kind == TWISTING else self.strains.frenet_torsion
         )
 
-    def ranges(self, pressure: float = np.inf) -> dict[str, tuple[float, float]]:
-        """{"stretch", "curvature", "twist": (lowest, highest)} over all angles and the pressures (MPa) up to
-        one."""
-        at = self.pressures <= pressure * (1 + 1e-9)
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """{"stretch", "curvature", "twist": (lowest, highest)} over all angles and pressures."""
         values = {"stretch": self.strains.stretch, "curvature": self.curvature, "twist": self.twist}
-        return {name: (float(np.nanmin(v[:, at])), float(np.nanmax(v[:, at]))) for name, v in values.items()}
+        return {name: (float(np.nanmin(v)), float(np.nanmax(v))) for name, v in values.items()}
 
-    def share(self, curvature: ArrayLike, twist: ArrayLike, pressure: float = np.inf) -> np.ndarray:
-        """(...,) what is asked of a piece over the most that can be done in that direction, at pressures
-        (MPa) up to one: up to 1 it is reachable. curvature (1/mm), twist (rad/mm) (...,): as of `Extracted`.
+    def share(self, curvature: ArrayLike, twist: ArrayLike) -> np.ndarray:
+        """(...,) what is asked of a piece over the most that can be done in that direction: up to 1 it is
+        reachable. curvature (1/mm), twist (rad/mm) (...,): as of `Extracted`.
 
         The direction of a one-sided segment is that of (curvature, torsion): between two of the angles its
         reach is interpolated, beyond the last one there is none (inf). A twisting one does not bend."""
         curvature, twist = np.broadcast_arrays(*(np.asarray(v, float) for v in (curvature, twist)))
         if self.kind == TWISTING:
-            low, high = self.ranges(pressure)["twist"]
+            low, high = self.ranges()["twist"]
             return np.maximum(twist / high if high > 0 else np.inf, twist / low if low < 0 else 0 * twist)
         size, direction = np.hypot(curvature, twist), np.arctan2(twist, curvature)
         most = np.zeros(size.shape)
-        for j in np.flatnonzero(self.pressures <= pressure * (1 + 1e-9)):
+        for j in range(len(self.pressures)):
             sizes = np.hypot(self.curvature[:, j], self.twist[:, j])
             known = sizes > 0  # nan is not
             if known.any():

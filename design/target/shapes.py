@@ -8,6 +8,7 @@ import numpy as np
 
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError, located
+from pneunet.base.quantities import shown
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.target.points import check_curve, checked_weights
 
@@ -60,7 +61,10 @@ class TipPoints:
 
 def checked_pressures(pressures: object) -> tuple[float, ...]:
     """Pressures in MPa; InputError unless each lies in 0..PRESSURE_LIMIT, and there is one."""
-    values = tuple(float(p) for p in np.atleast_1d(np.asarray(pressures, float)))
+    try:
+        values = tuple(float(p) for p in np.atleast_1d(np.asarray(pressures, float)))
+    except (TypeError, ValueError):
+        raise InputError(f"pressures must be numbers in MPa, not {shown(pressures)}") from None
     for value in values:
         if not 0 <= value <= PRESSURE_LIMIT * (1 + 1e-9):
             told = f"pressure_kPa = {KPA_PER_MPA * value:g}"

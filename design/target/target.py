@@ -9,16 +9,17 @@ import numpy as np
 from pneunet.base.curve import Curve
 from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, of_modulus, silicone
-from pneunet.base.quantities import Checked, quantity
+from pneunet.base.quantities import Checked, quantity, shown
 from pneunet.design.target.casting import Casting
-from pneunet.design.target.points import check_curve
+from pneunet.design.target.points import check_curve, held_base
 from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
 from pneunet.design.target.shapes import TargetShape, TipPoints, checked_pressures
 from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.parameters import MOST_GROUPS
 
-#: kinds of pieces beside TWISTING, which is straight and turns about itself; PASSIVE: straight, with no twist
-#: wanted
-BENDING, HELICAL, PASSIVE = "bending", "helical", "passive"
+#: kinds of pieces beside TWISTING, which is straight and turns about itself, and PASSIVE: straight, with no
+#: twist wanted
+BENDING, HELICAL = "bending", "helical"
 LENGTH_TOLERANCE = 0.02  # the pieces' lengths may miss the curve's by this fraction
 
 
@@ -45,7 +46,7 @@ class SplitOptions(Checked):
     """How a curve is split where no pieces are given, and whether given ones are refined."""
 
     tolerance: float | None = quantity(
-        "mm", None, "noise to be assumed at least; default 0.0002 of the length", above=0, high=100
+        "mm", None, "noise to be assumed at least; by default a part of the length", above=0, high=100
     )
     most_pieces: int = quantity(None, 8, "pieces at most", low=1, high=20)
     shortest: float = quantity("mm", 20.0, "length of the shortest piece", low=1, high=1000)
@@ -58,7 +59,7 @@ class Target:
 
     frames (n, 3, 3): section frames at the points, columns t1 (along), t2 (width), t3 (height);
     weights (n,) >= 0: how much each point counts (None: alike; all 0: the curve is a guide, and only `tip`
-    and `shapes` count); pieces: the split; base_direction, base_width (3,): unit vectors that hold the base
+    and `shapes` count); pieces: the split; base_direction, base_width (3,): vectors that hold the base
     (width None = its roll stays free, both None = it is free to turn); gravity (3,): acceleration in mm/s2,
     in the target's coordinates; pressure_range (low, high) in MPa, equal = fixed; pressures: fixed ones of
     several groups of segments instead; shapes: further `TargetShape`s, each at pressures of its own; tip:
@@ -101,6 +102,17 @@ class Target:
         if self.weights is not None and not self.weights.any() and nothing_else:
             raise InputError("weights: all are 0, so that nothing is asked for: give one that is larger")
         object.__setattr__(self, "gravity", DeadLoads(gravity=tuple(self.gravity)).gravity)
+        along, across = held_base(self.base_direction, self.base_width)
+        object.__setattr__(self, "base_direction", along)
+        object.__setattr__(self, "base_width", across)
+        if self.pressure_range is not None:
+            ends = checked_pressures(self.pressure_range)
+            if len(ends) != 2 or not ends[0] <= ends[1] or not ends[1]:
+                raise InputError(f"pressure_range = {self.pressure_range} must be (lowest, highest) in MPa")
+            object.__setattr__(self, "pressure_range", ends)
+        if type(self.groups) is not int or not 1 <= self.groups <= MOST_GROUPS:
+            told = f"pressure_groups = {shown(self.groups)}"
+            raise InputError(f"{told} must be a whole number, 1..{MOST_GROUPS}")
         if self.pressures:
             object.__setattr__(self, "pressures", checked_pressures(self.pressures))
         if self.pieces:

@@ -13,7 +13,7 @@ from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Segment
 from pneunet.reduced.rod.clearance import allowed_stretch
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.prediction import doubts, predict
+from pneunet.reduced.rod.prediction import doubts, predict_design
 
 #: of the design's pressure: no limit is looked for beyond
 FARTHEST = 3.0
@@ -92,7 +92,7 @@ def _limit_point(design, law, solved):
 
     def objection(pressure):
         try:
-            predict(design.manipulator, design.scaled(pressure), law)
+            predict_design(design, design.scaled(pressure), law)
         except ConvergenceError:
             return "limit point: the law finds no equilibrium beyond"
         except InputError as error:

@@ -1,6 +1,5 @@
 """The sheet as one HTML page, and as a PDF by matplotlib."""
 
-import base64
 import textwrap
 from collections.abc import Sequence
 from html import escape
@@ -8,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from pneunet.base.files.atomic import atomic_path, write_text
-from pneunet.base.files.record import revision
+from pneunet.base.pictures.rendering import figure
 from pneunet.design.report.drawing import drawing_figure
-from pneunet.design.report.page import STYLE
+from pneunet.design.report.page import document, image, table
 from pneunet.design.workshop.sheet import Block, Picture, SheetTable, Steps
 from pneunet.geometry.designfile import DesignFile
 
@@ -26,29 +25,17 @@ def write_html(path: Path, name: str, sections: Sections) -> None:
     body = f"<h1>{escape(name)}: workshop sheet</h1>"
     for title, blocks in sections:
         body += f"<section><h2>{escape(title)}</h2>{''.join(_html(b, path.parent) for b in blocks)}</section>"
-    write_text(
-        path,
-        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(name)}: workshop sheet</title><style>{STYLE} td {{ white-space: normal; }}</style>"
-        f"</head><body>{body}<footer>pneunet, revision {escape(revision())}. Lengths in mm.</footer></body>"
-        "</html>\n",
-    )
+    style = " td { white-space: normal; }"
+    write_text(path, document(f"{name}: workshop sheet", body, "Lengths in mm.", style))
 
 
 def _html(block, folder):
     if isinstance(block, SheetTable):
-        head = "".join(f"<th>{escape(h)}</th>" for h in block.header)
-        rows = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in block.rows)
-        return f'<div class="table"><table><tr>{head}</tr>{rows}</table></div>'
+        return table(block.header, block.rows)
     if isinstance(block, Steps):
         return f"<ol>{''.join(f'<li>{escape(text)}</li>' for text in block.texts)}</ol>"
     if isinstance(block, Picture):
-        data, told = base64.b64encode((folder / block.file).read_bytes()).decode(), escape(block.caption)
-        return (
-            f'<figure><img alt="{told}" src="data:image/png;base64,{data}"><figcaption>{told}</figcaption>'
-            "</figure>"
-        )
+        return image(folder, block.file, block.caption)
     return f"<p>{escape(block)}</p>"
 
 
@@ -79,9 +66,7 @@ class _Pages:
 
     def turn(self) -> None:
         """To a new page."""
-        from matplotlib.figure import Figure
-
-        self.figures.append(Figure(figsize=PAGE, facecolor="white"))
+        self.figures.append(figure(*PAGE))
         self.left = PAGE[1] - MARGIN
 
     def line(self, text: str, size: float = 9.5, weight: str = "normal", family: str = "sans-serif") -> None:

@@ -10,7 +10,7 @@ from pneunet.design.search.tolerances import PER_ANGLE, PER_LENGTH, Effect, dime
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Manipulator
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.prediction import predict
+from pneunet.reduced.rod.prediction import predict_design
 
 #: equal fractions of arc length at which shapes are compared
 STATIONS = np.linspace(0, 1, 101)
@@ -49,5 +49,5 @@ def _moved(design, i, change, law):
 
 
 def _points(design, manipulator, law):
-    line = predict(manipulator, design.pressure, law)
+    line = predict_design(replace(design, manipulator=manipulator), design.pressure, law)
     return np.column_stack([np.interp(STATIONS * line.s[-1], line.s, x) for x in line.points.T])

@@ -19,7 +19,7 @@ from pneunet.geometry import tags
 from pneunet.geometry.cad.polyhedra import bar_solid, channel_solid
 from pneunet.geometry.ends import Bar, PlacedSegment, placed
 from pneunet.geometry.parameters import Manipulator, Segment
-from pneunet.geometry.sections import rotation
+from pneunet.geometry.sections import chamber_plan, rotation
 from pneunet.geometry.snapping import snapped
 
 _TOLERANCE = 1e-6  # mm; OpenCASCADE pads bounding boxes by 1e-7
@@ -48,21 +48,6 @@ def prism(corners: np.ndarray, z0: float, z1: float) -> int:
     return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, z1 - z0) if dim == 3)
 
 
-def slanted_plan(x: float, thickness: float, half_width: float, segment: Segment, side: int) -> np.ndarray:
-    """Plan corners (4, 2) of a chamber centred at x: `thickness` normal, between y = -half_width and
-    +half_width."""
-    half = thickness / segment.sin / 2
-    slant = segment.cot * half_width * side
-    return np.array(
-        [
-            [x - slant - half, -half_width],
-            [x - slant + half, -half_width],
-            [x + slant + half, half_width],
-            [x + slant - half, half_width],
-        ]
-    )
-
-
 def box(x0: float, x1: float, half_width: float, z0: float, z1: float) -> int:
     """Volume tag of a box that lies evenly about y = 0 (mm)."""
     return gmsh.model.occ.addBox(x0, -half_width, z0, x1 - x0, 2 * half_width, z1 - z0)
@@ -73,7 +58,7 @@ def chamber_block(
 ) -> int:
     """Volume tag of a slanted block centred at x: z0 to z1 above the axis, below it on side -1 (mm)."""
     low, high = sorted((side * z0, side * z1))
-    return prism(slanted_plan(x, thickness, half_width, segment, side), low, high)
+    return prism(chamber_plan(segment, x, thickness, half_width, side), low, high)
 
 
 def fuse(tags: list[int], unify: bool) -> list[tuple[int, int]]:

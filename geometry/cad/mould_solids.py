@@ -18,6 +18,7 @@ from pneunet.geometry.fillets import rounding
 from pneunet.geometry.moulds.layers import Run
 from pneunet.geometry.moulds.parameters import Moulds
 from pneunet.geometry.parameters import Manipulator
+from pneunet.geometry.sections import chamber_plan
 from pneunet.geometry.snapping import snapped
 
 #: chords of a quarter of a rounded edge
@@ -167,7 +168,7 @@ def outside(run: Run, plane: float, moulds: Moulds) -> list[tuple[int, int]]:
         for x in p.positions if 1 in p.sides else ():
 
             def plan(z, x=x, s=s, thickness=thickness):
-                return cad.slanted_plan(x, thickness(z), s.width / 2 + grown(z), s, 1)
+                return chamber_plan(s, x, thickness(z), s.width / 2 + grown(z))
 
             tags.append(frustum(plan, levels))
     return cad.fuse(tags, unify=True)
@@ -198,9 +199,7 @@ def void(run: Run, plane: float, top: float, below: float, moulds: Moulds) -> li
                 def cavity(z, x=x, s=s, side=side, tips=tips, inset=inset):
                     tip = float(np.interp(z, tips, inset))
                     less = moulds.slope * (z - plane) + tip
-                    plan = cad.slanted_plan(
-                        x, s.cavity_thickness - 2 * less, s.cavity_width / 2 - less, s, side
-                    )
+                    plan = chamber_plan(s, x, s.cavity_thickness - 2 * less, s.cavity_width / 2 - less, side)
                     # a corner that shrank to a point would be no polygon's
                     radius = max(s.fillet - tip, s.fillet / 10) if s.fillet else moulds.fillet
                     return rounded(plan, radius)

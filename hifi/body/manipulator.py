@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pneunet.base import se3
+from pneunet.base.strains import RodStrains
 from pneunet.geometry import tags
 from pneunet.geometry.loading import DeadLoads
 from pneunet.geometry.parameters import Manipulator
@@ -56,7 +57,7 @@ class Measured:
     largest_stretch: float
     stations: np.ndarray
     frames: np.ndarray
-    strains: object
+    strains: RodStrains
     walls: np.ndarray | None
     touch: Touch
     unstable: int

@@ -103,7 +103,6 @@ class WallDistances:
         #: (facets,) of this rank: walls 2 g and 2 g + 1 face each other across gap g
         self.wall_of_facet = np.array(wall_of_facet, int)
         self._wall = gathered(self.comm, self.wall_of_facet)
-        self.reference = gathered(self.comm, problem.nodes[self.facets])
 
     def distances(self, array: np.ndarray | None = None) -> np.ndarray | None:
         """(gaps,) signed smallest distances in mm, on rank 0 (None elsewhere); inf where a gap has no

@@ -34,7 +34,7 @@ class Solid:
 
 
 def held_at(problem: CellProblem, held: np.ndarray, strains: np.ndarray) -> CellState:
-    """(CellState at the `strains` (6,) that are `held` (6,) bool, the others free; unknowns)."""
+    """The CellState at the `strains` (6,) that are `held` (6,) bool, the others free."""
     system = CellSystem(problem, held, (0.0, 0.0), (REST, np.where(held, strains - REST, 0.0)))
     path = EquilibriumPath(
         system, LoadControl("the held strains"), NewtonOptions(relative_tolerance=RELATIVE_TOLERANCE)

@@ -6,13 +6,11 @@ so that the solid keeps its volume. Chambers move with the sections; their swell
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pneunet.base.errors import InputError
 from pneunet.geometry.parameters import Manipulator, Segment
 from pneunet.geometry.sections import rotation
-from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.prediction import predict
+from pneunet.reduced.rod.centreline import Centreline
 
 
 def _box(divisions):
@@ -61,20 +59,15 @@ def segment_outline(segment: Segment, spacing: float = 1.0) -> tuple[np.ndarray,
 
 
 def body_surface(
-    manipulator: Manipulator,
-    pressure: float | ArrayLike,
-    law: SegmentLaw,
-    spacing: float = 1.0,
-    base_pose: np.ndarray | None = None,
+    manipulator: Manipulator, line: Centreline, spacing: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The deformed outline of a manipulator at `pressure` (MPa; one for all, or one for each group).
+    """The deformed outline of a manipulator along a Centreline of it.
 
     Returns vertices (n, 3) in mm, quads (m, 4) of vertex numbers, and the segment's index of each quad (m,).
-    spacing: edge length along the body, mm; base_pose (4, 4) as in `predict`.
+    spacing: edge length along the body, mm.
     """
     if not spacing > 0:
         raise InputError(f"spacing = {spacing:g} mm must be larger than 0")
-    line = predict(manipulator, pressure, law, spacing, base_pose)
     stretch = line.strains.stretch
     vertices, quads, owner, count = [], [], [], 0
     for i, (segment, start) in enumerate(zip(manipulator.segments, manipulator.starts)):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pneunet.base.strains import RodStrains
 from pneunet.geometry.parameters import ONE_SIDED, PASSIVE, Segment
 from pneunet.geometry.sections import rotation
-from pneunet.geometry.shape_numbers import SHAPE
+from pneunet.geometry.shape_numbers import PITCH_BY, SHAPE
 from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import SegmentLaw
 from pneunet.reduced.rod.states import VARIABLES, StatesWithSlopes
@@ -20,9 +20,6 @@ FIELDS = (*SHAPE, "end_margin", "plain_length", "chambers", "pressure", "mu")
 FIELD_AT = {name: i for i, name in enumerate(FIELDS)}
 #: of what laws give slopes by
 OF_LAWS = [FIELD_AT[name] for name in VARIABLES]
-#: of the normal pitch by some of them
-PITCH_BY = {"cavity_thickness": 1.0, "wall": 2.0, "gap": 1.0}
-_OF_PITCH = [FIELD_AT[name] for name in PITCH_BY]
 
 
 def cell_states(
@@ -86,9 +83,9 @@ def strain_slopes(segments: Sequence[Segment], free: np.ndarray, counts: np.ndar
 def cells_length_by(segment: Segment, count: float) -> np.ndarray:
     """(fields,) derivatives of the length (mm) of `count` cells."""
     out = np.zeros(len(FIELDS))
+    out[: len(SHAPE)] = count / segment.sin * PITCH_BY
     out[FIELD_AT["chambers"]] = segment.pitch
     out[FIELD_AT["angle"]] = -count * segment.pitch * segment.cot * np.radians(1.0)
-    out[_OF_PITCH] = count / segment.sin * np.array(list(PITCH_BY.values()))
     return out
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pneunet.base import se3
 from pneunet.base.errors import InputError
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
@@ -63,12 +64,9 @@ class Rod:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pieces", tuple(self.pieces))
-        object.__setattr__(self, "base_pose", np.asarray(self.base_pose, float))
+        object.__setattr__(self, "base_pose", se3.checked_pose(self.base_pose, "base_pose"))
         if not self.pieces:
             raise InputError("pieces: a rod needs at least one")
-        R = self.base_pose[:3, :3]
-        if self.base_pose.shape != (4, 4) or abs(R.T @ R - np.eye(3)).max() > 1e-6:
-            raise InputError("base_pose: give a (4, 4) pose with a rotation matrix")
 
     def __repr__(self) -> str:
         highest = max(p.pressure for p in self.pieces) * KPA_PER_MPA

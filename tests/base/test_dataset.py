@@ -126,6 +126,8 @@ def test_what_is_wrong_in_a_file_is_named_with_its_member(tmp_path, data):
         ({"about": np.frombuffer(b"[1]", np.uint8)}, "member 'about': is no table of keys"),
         ({"about": about(kinds="twisting")}, "member 'about' has no list 'kinds'"),
         ({"about": about(meshes=[5])}, "member 'about': '5' is not understood"),
+        ({"about": about(kinds=[[1]])}, r"member 'about': '\[1\]' is not understood"),
+        ({"about": about(meshes=[{"name": [1], "mesh_size_mm": 1}])}, "member 'about': .*is not understood"),
         (
             {"about": about(meshes=[{"name": "a", "mesh_size_mm": "b"}])},
             "member 'about': .*is not understood",

@@ -18,6 +18,7 @@ from pneunet.base.materials.laws import (
     Yeoh,
     material_from_table,
     material_to_table,
+    of_modulus,
     silicone,
 )
 from pneunet.base.materials.silicones import measured_silicones
@@ -263,3 +264,10 @@ def test_wrong_tables_are_named(table, message):
 def test_the_table_in_the_docs_is_the_code_s():
     text = (Path(__file__).parents[2] / "docs" / "materials.md").read_text()
     assert "\n".join(rows(measured_silicones())) in text
+
+
+@pytest.mark.parametrize("material", [LAWS[1], NeoHookean(0.4, bulk_modulus=2.0)])
+def test_a_material_of_another_modulus_is_as_compressible(material):
+    soft = of_modulus(material, material.mu / 4)
+    assert soft.mu == pytest.approx(material.mu / 4)
+    assert soft.bulk_modulus == pytest.approx(material.bulk_modulus / 4)

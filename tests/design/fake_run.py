@@ -66,7 +66,7 @@ def _solve(folder, design, model, reached, overlap, contact, fields):
     steps, centrelines, segments = [], [], []
     for n, p in enumerate(design.largest_pressure * reached * np.linspace(0, 1, 5)):
         line = predict(manipulator, design.scaled(p), model, spacing=3.0)
-        each = segment_strains(manipulator, design.scaled(p), model).vector
+        each = segment_strains(manipulator, line).vector
         work = (4, 2) if n else (0, 0)
         steps.append(
             [n, p * 1e3, *work, 900 + 4e3 * p, *line.points[-1], 1.0 - 10 * p, 0, 20.0, 0, 0, 1 + 5 * p]

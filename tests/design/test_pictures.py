@@ -8,10 +8,11 @@ import pytest
 from pneunet.base.errors import ConvergenceError, InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.design.report.dimensions import spread
-from pneunet.design.report.drawing import chamber_plan, section_groups, segment_table
+from pneunet.design.report.drawing import section_groups, segment_table
 from pneunet.design.report.labels import kPa, plain, segment_name, significant
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.parameters import Manipulator, Segment
+from pneunet.geometry.sections import chamber_plan
 from pneunet.reduced import AnalyticLaw
 from tests.design.fake_run import HELIX, PLANE, POSE, TWIST, make_run
 

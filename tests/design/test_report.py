@@ -9,10 +9,14 @@ import pytest
 from pneunet.base.errors import InputError
 from pneunet.base.files.atomic import read_columns
 from pneunet.base.se3 import transform
+from pneunet.design.design import Design
 from pneunet.design.report.comparison import Comparison, overlaps, smooth, stopped_short, verdict
 from pneunet.design.report.rundata import read_design_folder
 from pneunet.design.target.metrics import compare
-from pneunet.reduced import AnalyticLaw
+from pneunet.geometry.designfile import DesignFile
+from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.parameters import Manipulator
+from pneunet.reduced import AnalyticLaw, shipped_law
 from tests.design.fake_run import FACTOR, HELIX, PLANE, POSE, make_run
 
 
@@ -30,6 +34,18 @@ def test_comparison_is_made_in_target_coordinates(tmp_path):
     assert c.reduced_target == compare(c.reduced, run.target)
     assert np.allclose(run.solve.strains.k, FACTOR * c.strains.k)
     assert not stopped_short(run) and c.notes == ()
+
+
+def test_dead_loads_act_in_the_prediction_too(tmp_path):
+    content = DesignFile(Manipulator((HELIX,)), 0.02, base_pose=POSE, loads=DeadLoads((0.0, 0.0, -9810.0)))
+    hanging = Design(content, shipped_law())
+    run = read_design_folder(hanging.save(tmp_path))
+    c = Comparison.of(run, shipped_law())
+    assert c.reduced == pytest.approx(hanging.prediction.points, abs=1e-9) and c.notes == ()
+    free = Comparison.of(replace(run, design=replace(run.design, loads=DeadLoads())), shipped_law())
+    assert "it was edited" in free.notes[0]
+    refused = Comparison.of(run, AnalyticLaw())
+    assert refused.reduced is None and any("free shapes alone" in note for note in refused.notes)
 
 
 def test_smooth_follows_an_arc_between_stations():

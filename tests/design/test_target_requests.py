@@ -62,6 +62,26 @@ def test_all_of_it_in_one_file(written):
     )
 
 
+def test_a_base_and_a_range_of_pressures_are_checked_from_python_too(written):
+    target = Target(POINTS, base_direction=(0, 0, 5), base_width=(3, 0, 0), pressure_range=(0, 0.02))
+    assert target.base_rotation == pytest.approx(np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]]))
+    assert written(LINES + "pressure_range_kPa = [0, 20]").pressure_range == target.pressure_range
+    for given, told in (
+        ({"base_direction": (0, 0)}, "'base_direction' must be three numbers"),
+        ({"base_direction": "up"}, "'base_direction' must be three numbers"),
+        ({"base_width": (1, 0, 0)}, "'base_width' needs 'base_direction' too"),
+        ({"base_direction": (1, 0, 0), "base_width": (1, 1, 0)}, "must be perpendicular"),
+        ({"pressure_range": (0, 30)}, "pressure_kPa = 30000 must lie in 0..60 kPa"),
+        ({"pressure_range": (0.03,)}, "must be .lowest, highest. in MPa"),
+        ({"pressure_range": "low"}, "must be numbers in MPa, not 'low'"),
+        ({"groups": "a"}, "pressure_groups = 'a' must be a whole number"),
+        ({"weights": ["a"] * len(POINTS)}, "weights must be numbers"),
+        ({"frames": [[1, 0], [0]]}, "frames must be three vectors of three numbers each"),
+    ):
+        with pytest.raises(InputError, match=told):
+            Target(POINTS, **given)
+
+
 def test_defaults_are_what_was_before():
     target = Target(POINTS)
     assert not target.loads and target.casting == Casting() and target.weights is None
@@ -100,11 +120,6 @@ def test_a_guide_is_an_arc_from_the_base_to_the_farthest_point():
     assert guide_to(np.array([[5.0, 0, 0]]), np.zeros(3), np.array([1.0, 0, 0]))[-1] == pytest.approx(
         [5, 0, 0]
     )
-
-
-def test_a_grid_takes_the_nearest_multiple():
-    assert Casting().on_grid(1.234) == 1.25 and Casting().on_grid(61.3, angle=True) == 61.5
-    assert Casting(grid=0.0).on_grid(1.234) == 1.234
 
 
 def test_strides_see_a_curve_behind_its_noise():

@@ -249,6 +249,7 @@ def test_a_data_set_of_another_sample_cannot_be_extended(tmp_path):
         ("design = 3", "designs"),
         ("designs = 0", "designs = 0 must lie in"),
         ('kinds = ["both"]', "'one-sided', 'twisting'"),
+        ('kinds = ["twisting", "twisting"]', "each once"),
         ('[[mesh]]\nname = "a"', "mesh_size_mm' is missing"),
         ('[[mesh]]\nname = "a"\nmesh_size_mm = 2\nslopes = 1', "'slopes' must be true or false, not 1"),
         (

@@ -1,13 +1,17 @@
 """STUDY.toml spread out into cases: what is varied, in which order, and where it ends up in the body."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from pneunet.base.errors import InputError
 from pneunet.base.files.toml import toml_text
 from pneunet.base.materials.laws import silicone
 from pneunet.geometry.designfile import design_from_tables
 from pneunet.geometry.reference_cases import CASES
 from pneunet.hifi.cell.file import CellCase, cell_from_tables, cell_tables
 from pneunet.hifi.runs.study.file import read_study, value_of
+from pneunet.hifi.runs.study.picture import draw
 
 SEGMENT = {"kind": "one-sided", "angle_deg": 60.0}
 CELL = {"pressure_kPa": 10.0, "material": {"mu_MPa": 0.3, "density_kg_per_m3": 1000.0}, "segment": SEGMENT}
@@ -90,6 +94,25 @@ def test_a_combination_that_is_no_body_keeps_its_reason(tmp_path):
     found = study(tmp_path, kind="cell", base=CELL, grid={"side_wall_mm": [1, 7]})
     good, bad = found.cases
     assert good.case and bad.case is None and "side_wall_mm = 7: two side walls do not fit" in bad.refusal
+
+
+@pytest.mark.parametrize(
+    "varied",
+    [{"case": [{}]}, {"grid": {"pressure_kPa": [[20, 10], [10, 20]]}}],
+    ids=["nothing", "a list"],
+)
+def test_a_study_of_one_body_as_it_is_and_one_of_lists_are_drawn(tmp_path, varied):
+    base = TWO | {"segment": [s | {"pressure_group": i} for i, s in enumerate(TWO["segment"], start=1)]}
+    found = study(tmp_path, kind="manipulator", base=base, **varied)
+    strains = {"k_norm_per_mm": "0.01", "k1_rad_per_mm": "0", "k2_per_mm": "0.01"}
+    levels = [{"pressure_kPa": p} | strains for p in "12"]
+    table = SimpleNamespace(of=lambda case: ({"status": "done"}, levels))
+    assert draw(found, table, tmp_path / "study.png") and (tmp_path / "study.png").stat().st_size > 10_000
+
+
+def test_segments_are_tables(tmp_path):
+    with pytest.raises(InputError, match="segments are written .base.segment., or"):
+        study(tmp_path, kind="segment", base=CELL | {"segment": 3}, grid={"angle_deg": [60]})
 
 
 def test_a_case_is_known_by_its_complete_inputs(tmp_path):

@@ -75,6 +75,8 @@ STUDIES = {
         "1000000 cases are more than the 10000 of one study: vary less, or coarser",
     ),
     "limit's value": ("[grid]", "[limits]\ntime_s = 0\n[grid]", "time_s = 0 must be larger than 0"),
+    "no segment": ("[base.segment]\n", "[[base.segmnt]]\n", "key 'segment' is missing"),
+    "a number alone": ("wall_mm", '"segment.1"', "'segment.1' leads nowhere in the body"),
     "two segments": ("[base.segment]", "[[base.segment]]", "a cell has one segment"),
 }
 

@@ -229,6 +229,12 @@ def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):
     ):
         refused = solve(folder, "--resume", *options)
         assert refused.returncode == 2 and message in refused.stderr and len(refused.stderr.splitlines()) == 1
+    steps = folder / "solve" / "steps.csv"
+    rows = steps.read_text()
+    steps.write_text(rows.replace("\n0,", "\nx,", 1))
+    refused = solve(folder, "--resume")
+    assert refused.returncode == 2 and "steps.csv: row 2 is damaged: solve without --resume" in refused.stderr
+    steps.write_text(rows)
     (folder / "solve" / "checkpoint.npz").unlink()
     assert (
         "starting from the beginning"

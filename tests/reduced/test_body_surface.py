@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pneunet.geometry import Manipulator, Segment
-from pneunet.reduced import AnalyticLaw, body_surface
+from pneunet.reduced import AnalyticLaw, body_surface, predict
 
 ARM = Manipulator((Segment("twisting", 60.0, 3, cavity_floor=0.5), Segment("one-sided", 70.0, 4)))
 
@@ -21,7 +21,7 @@ def box_volume(s):
 
 
 def test_rest_has_the_volume_of_core_and_chambers():
-    vertices, quads, owner = body_surface(ARM, 0.0, AnalyticLaw())
+    vertices, quads, owner = body_surface(ARM, predict(ARM, 0.0, AnalyticLaw()))
     for i, segment in enumerate(ARM.segments):
         assert enclosed(vertices, quads[owner == i]) == pytest.approx(box_volume(segment), rel=1e-9)
     assert vertices[:, 0].min() == pytest.approx(0.0) and vertices[:, 0].max() == pytest.approx(ARM.length)
@@ -31,5 +31,5 @@ def test_rest_has_the_volume_of_core_and_chambers():
 
 def test_twisting_and_stretching_keep_the_volume():
     arm = Manipulator((ARM.segments[0],))
-    vertices, quads, _ = body_surface(arm, 0.03, AnalyticLaw(), spacing=0.5)
+    vertices, quads, _ = body_surface(arm, predict(arm, 0.03, AnalyticLaw(), 0.5), spacing=0.5)
     assert enclosed(vertices, quads) == pytest.approx(box_volume(arm.segments[0]), rel=5e-3)

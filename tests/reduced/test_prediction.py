@@ -25,6 +25,7 @@ from pneunet.reduced.rod.areas import passive_mass
 from pneunet.reduced.rod.ends import free_pieces
 from pneunet.reduced.rod.laws import FreeSection
 from pneunet.reduced.rod.overlap import overlap_doubts
+from pneunet.reduced.rod.prediction import segment_strains
 from pneunet.reduced.rod.quadratic import passive_law
 
 TWISTING = Segment("twisting", 60.0, 4, cavity_floor=0.5)
@@ -85,6 +86,20 @@ def test_a_free_rod_and_a_prediction_are_the_same(name):
     np.testing.assert_allclose(rod.free_strains.vector, known, rtol=0, atol=1e-10)
 
 
+def test_a_prediction_under_loads_is_the_rods_equilibrium_and_tells_the_strains_of_segments():
+    loads, base = DeadLoads((0.0, 0.0, -9810.0), (0.0, 0.01, 0.0)), np.diag([-1.0, -1.0, 1.0, 1.0])
+    state = Rod.of(ARM, shipped_law(), 0.03, base).equilibrium(loads, tolerance=1e-4)
+    line = predict(ARM, 0.03, shipped_law(), 2.0, base, loads)
+    assert np.diff(line.s).max() <= 2.0 and line.s[-1] == pytest.approx(ARM.length)
+    np.testing.assert_allclose(line.poses[-1], state.tip, rtol=0, atol=1e-9)
+    free = predict(ARM, 0.03, shipped_law(), 2.0, base)
+    assert np.linalg.norm(free.points[-1] - line.points[-1]) > 1
+    of_cells = shipped_law().each(ARM.segments, 0.03).vector
+    np.testing.assert_allclose(segment_strains(ARM, free).vector, of_cells, rtol=0, atol=1e-12)
+    middle = segment_strains(ARM, line).vector - of_cells
+    assert (np.abs(middle[:, 3:]).max(axis=1) > 1e-4).all() and np.abs(middle[:, 3:]).max() < 0.05
+
+
 def test_laws_may_be_one_for_each_segment_and_pressures_one_for_each_group():
     laws = [shipped_law(), QUADRATIC, AnalyticLaw()]
     body = Manipulator([replace(s, group=i) for s, i in zip(ARM.segments, (1, 2, 2))])
@@ -104,7 +119,7 @@ def test_a_rolled_segment_is_the_unrolled_one_turned_about_the_axis(roll):
     for law in (shipped_law(), AnalyticLaw()):
         points, expected = (predict(b, 0.03, law).points for b in (turned, body))
         np.testing.assert_allclose(points, se3.transform(rotation, expected), rtol=0, atol=1e-13)
-        own, other = (body_surface(b, 0.03, law, 4.0)[0] for b in (body, turned))
+        own, other = (body_surface(b, predict(b, 0.03, law), 4.0)[0] for b in (body, turned))
         np.testing.assert_allclose(other, se3.transform(rotation, own), rtol=0, atol=1e-12)
     gravity, force = np.array([2e3, -3e3, 5e3]), np.array([0.01, -0.004, 0.006])
     loads = [DeadLoads(tuple(r @ gravity), tuple(r @ force)) for r in (np.eye(3), rotation[:3, :3])]

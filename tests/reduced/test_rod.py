@@ -335,6 +335,8 @@ BAD = {
     "pressure": (lambda: RodPiece(1.0, law(), -1e-3), "pressure_kPa = -1"),
     "mass": (lambda: RodPiece(1.0, law(), mass=np.nan), "mass = nan"),
     "pose": (lambda: Rod([RodPiece(1.0, law())], 2 * np.eye(4)), "base_pose"),
+    "mirror": (lambda: Rod([RodPiece(1.0, law())], np.diag([-1.0, 1, 1, 1])), "base_pose"),
+    "no pose": (lambda: Rod([RodPiece(1.0, law())], np.ones(4)), "base_pose"),
     "no law": (
         lambda: RodPiece(1.0, 3.0),
         "law: float is no SectionLaw, which has free_strains, psi, force and stiffness",

@@ -50,10 +50,13 @@ def taken_over(campaign: Campaign, path: str | Path) -> Known:
                 f"{path}: its mesh is {meshes[d.mesh.name]}, the campaign's {d.mesh.settings}: extend it with"
                 " the same"
             )
+        status = about["statuses"][data.status[row]]
+        if status not in STATUSES:
+            raise InputError(f"{path}: the status '{status}' of a case is not known to this version")
         case = _row(data, "cases", row) | {
             "kind": campaign.kinds.index(d.kind),
             "mesh": campaign.meshes.index(d.mesh),
-            "status": STATUSES.index(about["statuses"][data.status[row]]),
+            "status": STATUSES.index(status),
         }
         states = [_row(data, "states", i) for i in np.flatnonzero(data.case == row)]
         cases[d.case.name] = case, states, about["reasons"].get(str(row), "")

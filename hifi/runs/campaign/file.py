@@ -119,8 +119,8 @@ def read_campaign(path: str | Path) -> Campaign:
     refuse_unknown(data, KEYS, where)
 
     kinds = data.get("kinds", list(KINDS))
-    if not isinstance(kinds, list) or not kinds or any(k not in KINDS for k in kinds):
-        raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting'")
+    if not isinstance(kinds, list) or not kinds or any(kinds.count(k) > 1 or k not in KINDS for k in kinds):
+        raise InputError(f"{where}: kinds = {kinds!r} must be a list of 'one-sided', 'twisting', each once")
     numbers = from_table(Numbers, {key: data[key] for key in quantities(Numbers) if key in data}, where)
     count, seed, table = numbers.designs, numbers.seed, asdict(numbers)
     common = {key: table[key] for key in ("levels", "top_pressure", "limit_share")}

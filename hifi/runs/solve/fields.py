@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base.files.atomic import write_text
+from pneunet.base.files.schemas import MEAN_STRETCH, STEP_FILES, step_file
 from pneunet.base.pictures.rendering import save_vtk
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.hifi.body.manipulator import ManipulatorSolve, Measured
@@ -55,10 +56,10 @@ class FieldWriter:
         on_rank_0(self.comm, lambda: self._keep(tables.history()))
 
     def _keep(self, steps):
-        names = {_name(row["step"]): self.goal.time(row["step"], row["pressure_kPa"]) for row in steps}
+        names = {step_file(row["step"]): self.goal.time(row["step"], row["pressure_kPa"]) for row in steps}
         self._listed = [(time, name) for name, time in names.items() if (self.directory / name).exists()]
         self._list()
-        for old in self.directory.glob("step_*.vtu"):
+        for old in self.directory.glob(STEP_FILES):
             if old.name not in names:
                 old.unlink()
 
@@ -86,7 +87,7 @@ class FieldWriter:
         fields = {
             "displacement": self.problem.displacement()[: self._owned],
             "pressure": self._pressure_at_nodes()[: self._owned],
-            "mean_stretch": self.stretch.nodal()[: self._owned],
+            MEAN_STRETCH: self.stretch.nodal()[: self._owned],
         }
         fields = {name: gathered(self.comm, values) for name, values in fields.items()} | {
             "wall_distance_mm": self._wall_distance()
@@ -103,7 +104,7 @@ class FieldWriter:
             grid.point_data[name] = values.astype(np.float32)
         for name, value in m.touch.marks.items():
             grid.field_data[name] = np.array([value], np.int32)
-        name = _name(m.step)
+        name = step_file(m.step)
         save_vtk(grid, self.directory / name)
         self._listed.append((self.goal.time(m.step, m.pressure * KPA_PER_MPA), name))
         self._list()
@@ -115,7 +116,3 @@ class FieldWriter:
             f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n <Collection>\n{rows}'
             " </Collection>\n</VTKFile>\n",
         )
-
-
-def _name(number):
-    return f"step_{number:04d}.vtu"

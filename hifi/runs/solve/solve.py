@@ -14,6 +14,7 @@ from pneunet.base.files.atomic import room_in
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.reading import read_json
 from pneunet.base.files.record import read_record
+from pneunet.base.files.schemas import STEP_FILES
 from pneunet.base.system.interrupts import Interrupted, deferred
 from pneunet.geometry.designfile import DesignFile, body_tables
 from pneunet.geometry.loading import Extras
@@ -212,7 +213,7 @@ def _prepare(design, directory, mesh_size, identity, resume):
     if resume and not kept:
         log.info(f"no {CHECKPOINT} in {out}: starting from the beginning")
     if not kept:
-        for old in [*out.glob("step_*.vtu"), out / "solution.pvd", out / "run.json", out / CHECKPOINT]:
+        for old in [*out.glob(STEP_FILES), out / "solution.pvd", out / "run.json", out / CHECKPOINT]:
             old.unlink(missing_ok=True)  # of an earlier run, which may have had more steps
     with output_folder(directory / "mesh") as folder:
         return _mesh(design, folder, mesh_size), kept

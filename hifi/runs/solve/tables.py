@@ -46,6 +46,9 @@ class Tables:
             header, rows = read_csv(path)
             if tuple(header) != columns:
                 raise InputError(f"{path}: has not the columns of this version: solve without --resume")
+            for number, row in enumerate(rows, start=2):
+                if len(row) != len(columns) or not _numbers(row):
+                    raise InputError(f"{path}: row {number} is damaged: solve without --resume")
             self.rows[name] = [row for row in rows if int(row[0]) <= last]
         seen = ("smallest_wall_distance_mm", "body_distance_mm", "contact_force_N")
         return [
@@ -90,3 +93,12 @@ class Tables:
             write_csv(self.directory / f"{name}.csv", columns, self.rows[name])
         walls = [[*gap, distance] for gap, distance in zip(self.gaps, m.walls)]
         write_csv(self.directory / "walls.csv", WALLS, walls)
+
+
+def _numbers(row):
+    try:
+        for cell in row:
+            float(cell)
+    except ValueError:
+        return False
+    return row[0].isdigit()

@@ -114,6 +114,8 @@ def _base(base, kind, path):
         raise InputError(f"{path} [base]: key 'segment' is missing: write [base.segment]")
     segment = base["segment"]
     single = isinstance(segment, dict)
+    if not single and not (isinstance(segment, list) and all(isinstance(row, dict) for row in segment)):
+        raise InputError(f"{path} [base]: segments are written [base.segment], or [[base.segment]] in a row")
     if kind == "cell" and not single:
         raise InputError(
             f"{path} [base]: a cell has one segment: write [base.segment], or kind = 'manipulator'"
@@ -180,7 +182,7 @@ def _inputs(study, base, values, where):
     for name in sorted(values, key=lambda name: name.rpartition(".")[2] not in NAMES_OF_MATERIALS):
         try:
             _put(tables, _path(name), values[name])
-        except (AttributeError, TypeError, ValueError):
+        except (AttributeError, IndexError, TypeError, ValueError):
             raise InputError(
                 f"{where}: '{name}' leads nowhere in the body; segments are counted from 1,"
                 " segment.1.angle_deg"

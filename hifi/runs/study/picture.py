@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pneunet.base.files.atomic import atomic_path
+from pneunet.base.pictures.rendering import figure, save
 from pneunet.hifi.contact.touch import marked
 from pneunet.hifi.runs.case_process import DONE
 from pneunet.hifi.runs.study.file import Study, value_of
@@ -33,14 +33,12 @@ MARKERS = ("", "o", "s", "^")
 def draw(study: Study, table: StudyTable, path: str | Path) -> bool:
     """Draw the levels of a StudyTable to `path`: colour tells the first variable, line and marker the others.
     False: no levels."""
-    from matplotlib.figure import Figure
-
     cases = [(case, *known) for case in study.cases if (known := table.of(case)) and known[1]]
     if not cases:
         return False
     prefixes = [name[: -len(PANELS[0][0])] for name in cases[0][2][0] if name.endswith(PANELS[0][0])]
-    figure = Figure(figsize=(13, 0.8 + 3.9 * len(prefixes)), facecolor="white", layout="constrained")
-    axes = figure.subplots(len(prefixes), len(PANELS), squeeze=False, sharex=True)
+    sheet = figure(13, 0.8 + 3.9 * len(prefixes), "constrained")
+    axes = sheet.subplots(len(prefixes), len(PANELS), squeeze=False, sharex=True)
     some_overlap = False
     looks = _Looks(study, [case for case, _, _ in cases])
     for row, prefix in zip(axes, prefixes):
@@ -61,9 +59,8 @@ def draw(study: Study, table: StudyTable, path: str | Path) -> bool:
             ax.set_title(prefix.strip("_"), fontsize=10)
             ax.axhline(0, color="0.8", linewidth=0.8, zorder=0)
             ax.spines[["top", "right"]].set_visible(False)
-    looks.explain(figure, axes, any(record["status"] != DONE for _, record, _ in cases), some_overlap)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+    looks.explain(sheet, axes, any(record["status"] != DONE for _, record, _ in cases), some_overlap)
+    save(sheet, path)
     return True
 
 
@@ -71,13 +68,13 @@ class _Looks:
     """Colour, line style and marker of each case, and the legend that tells them."""
 
     def __init__(self, study, cases):
-        self.variable, *self.others = study.variables
-        self.values = _in_order([value_of(self.variable, case) for case in cases])
+        self.variable, *self.others = study.variables or ("",)  # of one body as it is nothing varies
+        self.values = _in_order([_value(self.variable, case) for case in cases])
         self.combinations = _in_order([self._combination(case) for case in cases])
         self.numeric = all(isinstance(value, (int, float)) for value in self.values)
 
     def _combination(self, case):
-        return tuple(value_of(name, case) for name in self.others)
+        return tuple(_value(name, case) for name in self.others)
 
     def _colour(self, value):
         from matplotlib import colormaps
@@ -96,7 +93,7 @@ class _Looks:
 
     def of(self, case):
         number = self.combinations.index(self._combination(case))
-        return {"color": self._colour(value_of(self.variable, case)), **self._line(number)}
+        return {"color": self._colour(_value(self.variable, case)), **self._line(number)}
 
     def explain(self, figure, axes, some_stopped, some_overlap):
         from matplotlib.cm import ScalarMappable
@@ -116,7 +113,9 @@ class _Looks:
             )
         else:
             handles += [
-                Line2D([], [], color=self._colour(v), label=_told(self.variable, v)) for v in self.values
+                Line2D([], [], color=self._colour(v), label=_told(self.variable, v))
+                for v in self.values
+                if self.variable
             ]
         if len(self.combinations) > 1:
             for number, combination in enumerate(self.combinations[: len(STYLES) * len(MARKERS)]):
@@ -129,6 +128,12 @@ class _Looks:
         if some_overlap:
             handles.append(Line2D([], [], label="overlap (no contact model)", **OVERLAP))
         figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9)
+
+
+def _value(name, case):
+    """value_of, lists as tuples."""
+    value = value_of(name, case)
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _in_order(values):
@@ -148,5 +153,7 @@ def _split(name):
 def _told(name, value):
     """'wall 1.2 mm', and a silicone by its name alone."""
     quantity, unit = _split(name)
+    if isinstance(value, tuple):
+        value = ", ".join(f"{each:g}" if isinstance(each, float) else str(each) for each in value)
     value = f"{value:g}" if isinstance(value, float) else str(value)
     return value if name == "silicone" else f"{quantity} {value} {unit}".strip()

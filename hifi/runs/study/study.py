@@ -65,9 +65,9 @@ def _finish(study, table, records, directory, ranks, seconds):
     counts[REFUSED] += sum(case.case is None for case in study.cases)
     counts = {status: number for status, number in counts.items() if number}
     overlapping = table.overlapping()
-    picture = draw(study, table, directory / "study.png")
     facts = {"variables": study.variables, "cases": counts, "overlapping_cases": overlapping}
     write_record(directory, kind=study.kind, **facts, ranks=ranks, wall_seconds=seconds)
+    picture = draw(study, table, directory / "study.png")
     summary = ", ".join(f"{number} {status}" for status, number in counts.items())
     if overlapping:
         summary += (
