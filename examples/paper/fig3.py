@@ -64,7 +64,8 @@ def statements(found: dict) -> list[Statement]:
         Statement(
             '"The slope of tau decreases with P, while the slope of lambda_z increases with P"',
             f"the slope of tau falls throughout at {falls.sum()} of 3 angles, that of the stretch rises at"
-            f" {rises.sum()} of 3" + (f". The law doubts: {doubted}" if doubted else ""),
+            f" {rises.sum()} of 3; unit cells themselves are in [paper-models.md](paper-models.md)"
+            + (f". The law doubts: {doubted}" if doubted else ""),
             bool(falls.all() and rises.all()),
         ),
         Statement(
