@@ -15,6 +15,7 @@ from pneunet.base.files.atomic import write_csv, write_text
 from pneunet.base.files.folder import output_folder
 from pneunet.base.files.record import write_record
 from pneunet.base.files.schemas import CENTRELINE, POINT
+from pneunet.base.quantities import shown
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA, each_in_MPa, in_MPa
 from pneunet.design.segmentation.segmentation import is_piece_row, piece_tables
@@ -288,6 +289,8 @@ class Design:
 
 def chosen_law(law: str | SegmentLaw) -> SegmentLaw:
     """A law by its name or file, or as it is; InputError where there is none of that name."""
+    if not isinstance(law, (str, SegmentLaw)):
+        raise InputError(f"law must be 'trained', 'analytic', a file or a SegmentLaw, not {shown(law)}")
     return choose_law(law) if isinstance(law, str) else law
 
 

@@ -57,7 +57,7 @@ def run_shape(
     """
     design = Design(read_design_file(design_path), choose_law() if law is None else law)
     if pressures_kPa is None:
-        pressures_kPa = [design.pressure_kPa * i / STEPS for i in range(1, STEPS + 1)]
+        pressures_kPa = sorted({design.pressure_kPa * i / STEPS for i in range(1, STEPS + 1)})
     if not len(pressures_kPa):
         raise InputError("--pressure-kPa: give at least one pressure")
     count = len(design.manipulator.segments)
@@ -130,13 +130,18 @@ def _list(pressures):
 
 def _pictures(design, shapes, folder):
     bodies = _bodies(design, progress(shapes.values(), "bodies"))
-    for p, (vertices, quads, segments) in zip(shapes, bodies):
-        write_quads(folder / f"body_{plain(p)}kPa.vtp", vertices, quads, {"segment": segments + 1})
+    files = {f"body_{plain(p)}kPa.vtp": body for p, body in zip(shapes, bodies)}
+    earlier = {*folder.glob("body_*kPa.vtp"), *folder.glob(FILM)}
+    for old in earlier - {folder / name for name in files}:
+        old.unlink()  # of an earlier run at other pressures
+    for name, (vertices, quads, segments) in files.items():
+        write_quads(folder / name, vertices, quads, {"segment": segments + 1})
     titles = [_each(design, p) for p in shapes]
     _picture_of_all(design.content.name, titles, bodies, folder / "bodies.png")
-    log.info(f"bodies at every pressure: {folder / 'bodies.png'}; {FRAMES} frames of the inflation follow")
+    log.info(f"bodies at every pressure: {folder / 'bodies.png'}")
     highest = max(shapes)
     if highest > 0:
+        log.info(f"{FRAMES} frames of the inflation follow")
         _animation(design, highest, folder / "inflation.gif")
         log.info(f"inflation from 0 to {plain(highest)} kPa: {folder / 'inflation.gif'}")
 

@@ -139,7 +139,7 @@ def body(design, law):
     """(things to render, points, words, limits of the colour bar or None) of the demo's body."""
     path = DEMO / "solve" / "solution.pvd"
     if not path.exists():
-        mesh = body_mesh(design, design.pressure, law)
+        mesh = body_mesh(design.manipulator, predict_design(design, design.pressure, law))
         return painted(mesh), mesh.points, "outline carried by the rod", None
     surface, (lines, _) = deformed_surface(read_solution(path), design.base_pose)
     limits = (1.0, float(np.percentile(surface.point_data[MEAN_STRETCH], 99)))

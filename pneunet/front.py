@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base import se3
+from pneunet.base.errors import InputError
 from pneunet.base.files.toml import from_table
 from pneunet.base.materials.fit_run import run_fit
 from pneunet.base.materials.fitting import Fit
 from pneunet.base.materials.laws import Hyperelastic, material_from_table
+from pneunet.base.quantities import shown
 from pneunet.base.units import each_in_MPa
 from pneunet.design.design import Design, chosen_law
 from pneunet.design.report.report import write_report
@@ -85,7 +87,7 @@ def predict(
     (.npz) or a SegmentLaw. InputError where a pressure or their number is wrong, ConvergenceError where the
     law has no equilibrium. What makes the law doubt its answer is logged.
     """
-    law, pressure = chosen_law(law), each_in_MPa(pressure_kPa)
+    law, pressure, manipulator = chosen_law(law), each_in_MPa(pressure_kPa), _body(manipulator)
     line = prediction.predict(manipulator, pressure, law, base_pose=_pose(base_pose))
     tell_doubts(prediction.doubts(manipulator, [pressure], law), law, WARN)
     return line
@@ -104,7 +106,14 @@ def rod(
     pressure_kPa: one for all, or one for each group of segments. InputError where a pressure or their number
     is wrong.
     """
-    return Rod.of(manipulator, chosen_law(law), each_in_MPa(pressure_kPa), _pose(base_pose))
+    return Rod.of(_body(manipulator), chosen_law(law), each_in_MPa(pressure_kPa), _pose(base_pose))
+
+
+def _body(given):
+    """A Manipulator, or InputError."""
+    if not isinstance(given, Manipulator):
+        raise InputError(f"manipulator: write pn.Manipulator((segment, ...)), not {shown(given)}")
+    return given
 
 
 def _pose(given):

@@ -149,25 +149,30 @@ class MeasuredComparison:
     def consequences(self) -> dict:
         """What the fit would change in the design, by file key: its pressure for the shape that was designed,
         how far the tip is off at the old one, and with a target the RMS distances from it; None for what the
-        law finds no equilibrium of."""
+        law finds no equilibrium of. Under dead loads no pressure gives that shape back."""
         if self.fit is None:
             return {}
         change, P = self.fit.change, self.design.content.largest_pressure
         kPa, line = P * KPA_PER_MPA, self.predicted.line
-        wanted, now, then = line(P), line(P, change), line(change.modulus * P, change)
-        out: dict = {"design_pressure_kPa": kPa, "pressure_for_the_shape_kPa": change.modulus * kPa}
-        for key, found in (("design", now), ("that", then)):
+        wanted, shapes = line(P), {"design": line(P, change)}
+        out: dict = {"design_pressure_kPa": kPa}
+        if not self.design.content.loads:
+            shapes["that"] = line(change.modulus * P, change)
+            out["pressure_for_the_shape_kPa"] = change.modulus * kPa
+        for key, found in shapes.items():
             tips = None if found is None or wanted is None else found.points[-1] - wanted.points[-1]
             out[f"tip_off_at_{key}_pressure_mm"] = None if tips is None else float(np.linalg.norm(tips))
         if self.design.target is not None:
-            for key, found in (("designed", wanted), ("cast", now), ("cast_at_that_pressure", then)):
+            cast = {"design": "cast", "that": "cast_at_that_pressure"}
+            of_target = {"designed": wanted} | {cast[key]: found for key, found in shapes.items()}
+            for key, found in of_target.items():
                 errors = None if found is None else compare_curves(found.points, self.design.target.curve)
                 out[f"target_rms_{key}_mm"] = None if errors is None else errors.rms
         return out
 
     def corrected(self) -> DesignFile:
-        """The design with the fitted modulus and walls, at the pressure for the shape that was designed.
-        InputError without a fit, or where there is no such body."""
+        """The design with the fitted modulus and walls, at the pressure for the shape that was designed,
+        under dead loads at its own. InputError without a fit, or where there is no such body."""
         if self.fit is None:
             raise InputError(f"{self.measured.path}: no fit, so nothing to correct: {self.no_fit}")
         change, content = self.fit.change, self.design.content
@@ -181,7 +186,8 @@ class MeasuredComparison:
             )
             for s in body.segments
         ]
-        largest = min(change.modulus * content.largest_pressure, LARGEST_PRESSURE_KPA * MPA_PER_KPA)
+        factor = 1.0 if content.loads else change.modulus
+        largest = min(factor * content.largest_pressure, LARGEST_PRESSURE_KPA * MPA_PER_KPA)
         return replace(
             content, manipulator=Manipulator(tuple(segments)), pressure=content.scaled(largest), result={}
         )
@@ -248,11 +254,14 @@ class MeasuredComparison:
         if f.at_the_edge:
             return [*out, "no modulus in reach fits: is it this body, in these units?"]
         off = c["tip_off_at_design_pressure_mm"]
-        out.append(
-            f"so the shape designed for {c['design_pressure_kPa']:.4g} kPa needs"
-            f" {c['pressure_for_the_shape_kPa']:.4g} kPa; at {c['design_pressure_kPa']:.4g} kPa"
-            + (" the law finds no equilibrium" if off is None else f" the tip is {off:.3g} mm off")
+        needs = (
+            "so no pressure gives the designed shape back, since the loads stay"
+            if self.design.content.loads
+            else f"so the shape designed for {c['design_pressure_kPa']:.4g} kPa needs"
+            f" {c['pressure_for_the_shape_kPa']:.4g} kPa"
         )
+        told = " the law finds no equilibrium" if off is None else f" the tip is {off:.3g} mm off"
+        out.append(f"{needs}; at {c['design_pressure_kPa']:.4g} kPa{told}")
         return out
 
     def rows(self) -> list[list]:

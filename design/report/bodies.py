@@ -1,13 +1,12 @@
 """Bodies to render: the reduced model's, the finite elements', curves as tubes (base.pictures.rendering makes
 pictures of them)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pneunet.base import se3
 from pneunet.base.errors import InputError
@@ -18,10 +17,10 @@ from pneunet.base.pictures.walls import FIELD
 from pneunet.design.report.comparison import Comparison
 from pneunet.design.report.labels import TARGET, rgb, segment_colour
 from pneunet.design.report.rundata import DesignFolder
-from pneunet.geometry.designfile import DesignFile
-from pneunet.geometry.loading import DeadLoads
+from pneunet.geometry.parameters import Manipulator
+from pneunet.reduced.rod.centreline import Centreline
 from pneunet.reduced.rod.laws import SegmentLaw
-from pneunet.reduced.rod.prediction import predict_design
+from pneunet.reduced.rod.prediction import predict, predict_design
 
 if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
@@ -37,15 +36,14 @@ def tube(points: np.ndarray, radius: float = 0.9, colour: str = TARGET) -> tuple
     return pyvista.lines_from_points(np.asarray(points, float)).tube(radius=radius), {"color": colour}
 
 
-def body_mesh(design: DesignFile, pressure: float | ArrayLike, law: SegmentLaw) -> "PolyData":
-    """The reduced model's body at a pressure (MPa), of one group of segments or each (pyvista.PolyData, mm,
-    target coordinates), cell data "segment" 1.. ."""
+def body_mesh(manipulator: Manipulator, line: Centreline) -> "PolyData":
+    """The body along a Centreline of it, as the reduced model has it (pyvista.PolyData, mm), cell data
+    "segment" 1.. ."""
     import pyvista
 
     from pneunet.reduced.rod.outline import body_surface
 
-    line = predict_design(design, pressure, law)
-    vertices, quads, segments = body_surface(design.manipulator, line)
+    vertices, quads, segments = body_surface(manipulator, line)
     mesh = pyvista.PolyData(vertices, np.column_stack([np.full(len(quads), 4), quads]).ravel())
     mesh.cell_data["segment"] = segments + 1
     return mesh
@@ -131,10 +129,11 @@ class Scene:
         design, solve, reduced, solved = run.design, run.solve, None, None
         pressure = design.pressure if solve is None else design.scaled(solve.pressure)
         if (comparison.reduced if solve is None else comparison.reduced_at_solve) is not None:
-            reduced = body_mesh(design, pressure, law)
+            reduced = body_mesh(design.manipulator, predict_design(design, pressure, law))
         if solve is not None and solve.solution is not None:
             solved = deformed_surface(read_solution(solve.solution), design.base_pose)
-        rest = body_mesh(replace(design, loads=DeadLoads()), 0.0, law)
+        unloaded = predict(design.manipulator, 0.0, law, base_pose=design.base_pose)
+        rest = body_mesh(design.manipulator, unloaded)
         held = [np.asarray(body.points) for body in (reduced, solved and solved[0]) if body is not None]
         held += [c for c in (run.target, comparison.solved, comparison.reduced) if c is not None]
         return cls(reduced, rest, solved, view_of(np.vstack(held or [rest.points])))

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pneunet.base import se3
-from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.errors import ConvergenceError
 from pneunet.base.strains import RodStrains
 from pneunet.base.units import KPA_PER_MPA
 from pneunet.design.report.labels import kPa, plain, significant
@@ -135,7 +135,7 @@ def stopped_short(run: DesignFolder) -> bool:
 def _predict(design, pressure, law, notes):
     try:
         return predict_design(design, pressure, law)
-    except (ConvergenceError, InputError) as error:  # a law of free shapes refuses loads
+    except ConvergenceError as error:
         notes.append(f"The reduced model has no solution at {kPa(pressure)}: {error}")
         return None
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from pneunet.base import se3
-from pneunet.base.errors import ConvergenceError, InputError
+from pneunet.base.errors import ConvergenceError
 from pneunet.base.files.schemas import MEAN_STRETCH
 from pneunet.base.pictures import rendering
 from pneunet.base.pictures.rendering import figure, save
@@ -140,7 +140,7 @@ def history_picture(
     for level in levels:
         try:
             line = predict_design(design, design.scaled(level * MPA_PER_KPA), law)
-        except (ConvergenceError, InputError):
+        except ConvergenceError:
             break
         tips.append(se3.transform(se3.inverse_pose(design.base_pose), line.points[-1]))
     for i, (name, colour) in enumerate(zip("xyz", ("#1f6fb2", "#2f9e44", "#d9480f"))):

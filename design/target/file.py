@@ -88,7 +88,10 @@ def _from_toml(path):
     for i, row in enumerate(shapes, start=1):
         refuse_unknown(row, SHAPE_KEYS, f"{where} [[shape]] {i}")
     if shapes and not _says_curve(table):  # the first shape is the one that is split
-        table = table | shapes.pop(0)
+        first = shapes.pop(0)
+        for key in sorted(first.keys() & table.keys()):
+            raise InputError(f"{where}: '{key}' is given at the top and in the first [[shape]]: give it once")
+        table = table | first
     tip = _tip(table, folder, where)
     base = as_table(table.get("base", {}), f"{where} [base]")
     point, (direction, width) = _base_point(base, where), _base(base, f"{where} [base]")
@@ -156,7 +159,7 @@ def _curve(table, folder, where):
             " 'tip_points' or 'target'"
         )
     if "points" in table:
-        if not isinstance(table["points"], str):
+        if not isinstance(table["points"], str) or not table["points"]:
             raise InputError(f"{where}: 'points' names a CSV file; write a list as 'points_mm'")
         curve = read_points(folder / table["points"])
     elif "wrap" in table:

@@ -31,6 +31,15 @@ def check_curve(curve: Any) -> None:
         object.__setattr__(curve, name, values)
 
 
+def checked_vector(vector: object, name: str) -> tuple[float, float, float]:
+    """Three finite numbers; InputError by this name for anything else."""
+    found = _floats(vector, f"{name} must be three numbers")
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise InputError(f"{name} must be three finite numbers, not {shown(vector)}")
+    x, y, z = found.tolist()
+    return x, y, z
+
+
 def held_base(
     direction: object, width: object, names: Sequence[str] = ("base_direction", "base_width")
 ) -> tuple[np.ndarray | None, np.ndarray | None]:

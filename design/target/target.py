@@ -11,7 +11,7 @@ from pneunet.base.errors import InputError
 from pneunet.base.materials.laws import PAPER_TWISTING, Hyperelastic, of_modulus, silicone
 from pneunet.base.quantities import Checked, quantity, shown
 from pneunet.design.target.casting import Casting
-from pneunet.design.target.points import check_curve, held_base
+from pneunet.design.target.points import check_curve, checked_vector, held_base
 from pneunet.design.target.shapes import PRESSURE_LIMIT as PRESSURE_LIMIT
 from pneunet.design.target.shapes import TargetShape, TipPoints, checked_pressures
 from pneunet.geometry.loading import DeadLoads
@@ -97,11 +97,24 @@ class Target:
         return read_target(path)
 
     def __post_init__(self) -> None:
+        tip = () if self.tip is None else (self.tip,)
+        for name, wanted, each in (
+            ("material", Hyperelastic, (self.material,)),
+            ("casting", Casting, (self.casting,)),
+            ("split", SplitOptions, (self.split,)),
+            ("tip", TipPoints, tip),
+            ("pieces", Piece, self.pieces),
+            ("shapes", TargetShape, self.shapes),
+        ):
+            if not isinstance(each, (list, tuple)) or not all(isinstance(one, wanted) for one in each):
+                raise InputError(f"{name} must be of {wanted.__name__}, not {shown(getattr(self, name))}")
         check_curve(self)
         nothing_else = self.tip is None and not self.shapes
         if self.weights is not None and not self.weights.any() and nothing_else:
             raise InputError("weights: all are 0, so that nothing is asked for: give one that is larger")
-        object.__setattr__(self, "gravity", DeadLoads(gravity=tuple(self.gravity)).gravity)
+        object.__setattr__(
+            self, "gravity", DeadLoads(gravity=checked_vector(self.gravity, "gravity")).gravity
+        )
         along, across = held_base(self.base_direction, self.base_width)
         object.__setattr__(self, "base_direction", along)
         object.__setattr__(self, "base_width", across)
@@ -113,7 +126,7 @@ class Target:
         if type(self.groups) is not int or not 1 <= self.groups <= MOST_GROUPS:
             told = f"pressure_groups = {shown(self.groups)}"
             raise InputError(f"{told} must be a whole number, 1..{MOST_GROUPS}")
-        if self.pressures:
+        if len(np.atleast_1d(self.pressures)):
             object.__setattr__(self, "pressures", checked_pressures(self.pressures))
         if self.pieces:
             object.__setattr__(self, "pieces", _fitted_to(self.pieces, self.length))

@@ -19,6 +19,9 @@ from pneunet.reduced.rod.prediction import doubts, predict_design
 FARTHEST = 3.0
 
 
+NO_EQUILIBRIUM = "limit point: the law finds no equilibrium beyond"
+
+
 @dataclass(frozen=True)
 class Limit:
     """pressure in MPa, the largest of the groups'; reason in words."""
@@ -37,11 +40,12 @@ def limits(design: DesignFile, law: SegmentLaw, solved: Solution | None = None) 
 def _touch(design, law, solved):
     told = None if solved is None else solved.record.get("first_touch_kPa")
     if told is not None:
-        yield Limit(told * MPA_PER_KPA, "walls of neighbouring chambers touch (finite elements)")
+        alone = " under the dead loads alone" * (told == 0 and bool(design.loads))
+        yield Limit(told * MPA_PER_KPA, f"walls of neighbouring chambers touch{alone} (finite elements)")
         return
     pressure, i = _first(design, lambda s, p: 1 - law.walls(s, p)[0], solved)
     if i is not None:
-        yield Limit(pressure, f"walls of segment {i} touch ({law.of_walls})")
+        yield Limit(pressure, f"walls of segment {i} touch ({_of_walls(design, law)})")
 
 
 def _break(design, law, solved):
@@ -59,7 +63,7 @@ def _break(design, law, solved):
         yield Limit(
             pressure,
             f"walls of segment {i} come to stretch {most:.2f}, half of the elongation at break"
-            f" ({law.of_walls})",
+            f" ({_of_walls(design, law)})",
         )
 
 
@@ -94,7 +98,7 @@ def _limit_point(design, law, solved):
         try:
             predict_design(design, design.scaled(pressure), law)
         except ConvergenceError:
-            return "limit point: the law finds no equilibrium beyond"
+            return NO_EQUILIBRIUM
         except InputError as error:
             return str(error)
         told = doubts(design.manipulator, [design.scaled(pressure)], law)
@@ -108,5 +112,10 @@ def _limit_point(design, law, solved):
         middle = (low + high) / 2
         told = objection(middle)
         low, high, reason = (low, middle, told) if told else (middle, high, reason)
-    if low:
+    if low or reason == NO_EQUILIBRIUM:
         yield Limit(low, reason)
+
+
+def _of_walls(design, law):
+    """Whose knowledge of walls it is; no law knows what loads do to them."""
+    return law.of_walls + ", without the loads" * bool(design.loads)

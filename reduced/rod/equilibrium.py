@@ -93,8 +93,8 @@ class Grid:
                 if step < SMALLEST_LOAD_STEP:
                     raise ConvergenceError(
                         f"rod: no stable equilibrium follows beyond {100 * reached:.4g} % of the loads: the"
-                        " rod buckles or snaps there; lower the loads, or disturb a perfect symmetry by a"
-                        " small side force"
+                        " rod buckles or snaps there, or its law knows no further; lower the loads, or"
+                        " disturb a perfect symmetry by a small side force"
                     )
                 continue
             self.load_steps += 1

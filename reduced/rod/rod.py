@@ -130,7 +130,9 @@ class Rod:
         stable equilibria exist, a small one leads to that of slow loading. InputError for laws that know free
         shapes alone.
         """
-        loads = loads or DeadLoads()
+        loads = DeadLoads() if loads is None else loads
+        if not isinstance(loads, DeadLoads):
+            raise InputError(f"loads: give what pn.loads(...) makes, not {type(loads).__name__}")
         bounds = ("tolerance", tolerance, 1e-9, 0.1), ("first_load", first_load, 1e-3, 1.0)
         for name, value, low, high in bounds:
             if not low <= value <= high:

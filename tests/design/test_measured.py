@@ -162,6 +162,14 @@ def test_dead_loads_are_predicted_with(tmp_path):
     assert np.allclose(rod.lines(Change(modulus=0.5))[1].points, softer.lines()[1].points, atol=1e-6)
     free = replace(rod, design=content)
     assert rod.lines()[1].points[-1, 2] > free.lines()[1].points[-1, 2] + 0.1
+    # the loads stay as they are: no pressure gives the shape of another modulus back
+    tips = [line.points[-1] for line in softer.lines()]
+    names = ["pressure_kPa", "tip_x_mm", "tip_y_mm", "tip_z_mm"]
+    write_csv(tmp_path / "s.csv", names, np.column_stack([[0, 20], tips]))
+    found = compare(Design(hanging), tmp_path / "s.csv", as_is=True)
+    assert found.fit.change.modulus == pytest.approx(0.5, rel=0.01)
+    assert "pressure_for_the_shape_kPa" not in found.consequences and "no pressure gives" in found.lines()[-1]
+    assert found.corrected().pressure == hanging.pressure
 
 
 def test_the_laws_bars_are_those_of_its_strains(tmp_path):

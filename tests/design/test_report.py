@@ -44,8 +44,8 @@ def test_dead_loads_act_in_the_prediction_too(tmp_path):
     assert c.reduced == pytest.approx(hanging.prediction.points, abs=1e-9) and c.notes == ()
     free = Comparison.of(replace(run, design=replace(run.design, loads=DeadLoads())), shipped_law())
     assert "it was edited" in free.notes[0]
-    refused = Comparison.of(run, AnalyticLaw())
-    assert refused.reduced is None and any("free shapes alone" in note for note in refused.notes)
+    with pytest.raises(InputError, match="^.loads.: the law 'analytic' knows free shapes alone"):
+        Comparison.of(run, AnalyticLaw())
 
 
 def test_smooth_follows_an_arc_between_stations():

@@ -75,6 +75,10 @@ def test_a_base_and_a_range_of_pressures_are_checked_from_python_too(written):
         ({"pressure_range": (0.03,)}, "must be .lowest, highest. in MPa"),
         ({"pressure_range": "low"}, "must be numbers in MPa, not 'low'"),
         ({"groups": "a"}, "pressure_groups = 'a' must be a whole number"),
+        ({"gravity": 9.81}, "gravity must be three finite numbers"),
+        ({"material": "Ecoflex 00-30"}, "material must be of Hyperelastic, not 'Ecoflex 00-30'"),
+        ({"pieces": "x"}, "pieces must be of Piece"),
+        ({"tip": 3}, "tip must be of TipPoints, not 3"),
         ({"weights": ["a"] * len(POINTS)}, "weights must be numbers"),
         ({"frames": [[1, 0], [0]]}, "frames must be three vectors of three numbers each"),
     ):

@@ -162,6 +162,11 @@ PIECE = '[[piece]]\nkind = "{}"\nlength_mm = 50\n{}'
         ('points = "curve.csv"\npressure_range_kPa = [9, 2]', "the smallest comes first"),
         ('points = "curve.csv"\npressure_range_kPa = [0, 0]', "must lie in 0..60 kPa"),
         ('points = "curve.csv"\npressure_kPa = 0', "and not be 0"),
+        ('points = ""', "'points' names a CSV file"),
+        (
+            "pressure_kPa = 9\n[[shape]]\npoints_mm = [[0, 0, 0]]\npressure_kPa = 9",
+            "'pressure_kPa' is given at the top and in the first [[shape]]",
+        ),
         ('points = "curve.csv"\nbase = 3', "[base]: must be a table of keys, not 3"),
         ('points = "curve.csv"\ncasting = []', "[casting]: must be a table of keys"),
         ("[[shape]]\npoints_mm = [[0, 0, 0]]\npresure_kPa = 9", "[[shape]] 1: unknown key 'presure_kPa'"),

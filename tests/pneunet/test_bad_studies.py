@@ -76,6 +76,11 @@ STUDIES = {
     ),
     "limit's value": ("[grid]", "[limits]\ntime_s = 0\n[grid]", "time_s = 0 must be larger than 0"),
     "no segment": ("[base.segment]\n", "[[base.segmnt]]\n", "key 'segment' is missing"),
+    "one by two names": (
+        "wall_mm = [1, 1.2]",
+        'wall_mm = [1]\n"segment.wall_mm" = [2]',
+        "are the same: leave one",
+    ),
     "a number alone": ("wall_mm", '"segment.1"', "'segment.1' leads nowhere in the body"),
     "two segments": ("[base.segment]", "[[base.segment]]", "a cell has one segment"),
 }

@@ -101,6 +101,13 @@ def test_what_is_none_is_refused(tmp_path):
     for pose in (np.eye(3), np.full((4, 4), np.nan), turned_too_far, "here"):
         with pytest.raises(pn.InputError, match=r"base_pose must be \(4, 4\): a rotation"):
             pn.predict(FINGER, pressure_kPa=20, base_pose=pose)
+    for body in (FINGER.segments[0], FINGER.segments, None):
+        with pytest.raises(pn.InputError, match="manipulator: write pn.Manipulator"):
+            pn.predict(body, pressure_kPa=20)
+    with pytest.raises(pn.InputError, match="law must be 'trained', .* a SegmentLaw, not 3"):
+        pn.rod(FINGER, pressure_kPa=20, law=3)
+    with pytest.raises(pn.InputError, match="loads: give what pn.loads"):
+        pn.rod(FINGER, pressure_kPa=20).equilibrium([0, 0, 1])
     for target in ("curve.csv", [["a", "b", "c"]] * 5, [[0, 0, 0], [1, 2]]):
         with pytest.raises(pn.InputError, match="points must be rows of x, y, z in mm, not"):
             pn.Target(target)

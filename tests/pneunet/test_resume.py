@@ -234,6 +234,8 @@ def test_resume_says_what_it_cannot_go_on_from(whole, tmp_path):
     steps.write_text(rows.replace("\n0,", "\nx,", 1))
     refused = solve(folder, "--resume")
     assert refused.returncode == 2 and "steps.csv: row 2 is damaged: solve without --resume" in refused.stderr
+    steps.write_text(rows + rows.splitlines()[-1] + "\n")
+    assert "steps.csv: rows are missing, or there twice" in solve(folder, "--resume").stderr
     steps.write_text(rows)
     (folder / "solve" / "checkpoint.npz").unlink()
     assert (

@@ -1,5 +1,6 @@
 """Tables of a solve: one row, or block of rows, for each accepted step."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -43,13 +44,19 @@ class Tables:
     def _read(self, last: int) -> list[tuple]:
         for name, columns in self.columns.items():
             path = self.directory / f"{name}.csv"
-            header, rows = read_csv(path)
+            try:
+                header, rows = read_csv(path)
+            except InputError as error:
+                raise InputError(f"{error}: solve without --resume") from None
             if tuple(header) != columns:
                 raise InputError(f"{path}: has not the columns of this version: solve without --resume")
             for number, row in enumerate(rows, start=2):
                 if len(row) != len(columns) or not _numbers(row):
                     raise InputError(f"{path}: row {number} is damaged: solve without --resume")
             self.rows[name] = [row for row in rows if int(row[0]) <= last]
+            of_steps = Counter(int(row[0]) for row in self.rows[name])
+            if list(of_steps) != list(range(last + 1)) or len(set(of_steps.values())) > 1:
+                raise InputError(f"{path}: rows are missing, or there twice: solve without --resume")
         seen = ("smallest_wall_distance_mm", "body_distance_mm", "contact_force_N")
         return [
             (

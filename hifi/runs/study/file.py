@@ -144,11 +144,16 @@ def _varied(data, base, where):
     for table, name in [(row, f"[[case]] {i}") for i, row in enumerate(listed, start=1)] + [(grid, "[grid]")]:
         bare = {key: value for key, value in table.items() if "." not in key and key not in base}
         refuse_unknown(bare, known, f"{where} {name}")
+        spelt: dict = {}
+        for key in table:
+            other = spelt.setdefault(tuple(_path(key)), key)
+            if other != key:
+                raise InputError(f"{where} {name}: '{other}' and '{key}' are the same: leave one out")
     for key, values in grid.items():
         if not isinstance(values, list) or not values:
+            example = "[1, 2]" if values == [] else f"[{values!r}, ...]"
             raise InputError(
-                f"{where} [grid]: {key} = {values!r} must be a list of values: write {key} = [{values!r},"
-                " ...]"
+                f"{where} [grid]: {key} = {values!r} must be a list of values: write {key} = {example}"
             )
         if key in listed[0]:
             raise InputError(f"{where} [grid]: '{key}' is in the list of cases too: leave it out of one")
@@ -184,8 +189,8 @@ def _inputs(study, base, values, where):
             _put(tables, _path(name), values[name])
         except (AttributeError, IndexError, TypeError, ValueError):
             raise InputError(
-                f"{where}: '{name}' leads nowhere in the body; segments are counted from 1,"
-                " segment.1.angle_deg"
+                f"{where}: '{name}' leads nowhere in the body"
+                + "; segments are counted from 1, segment.1.angle_deg" * isinstance(base["segment"], list)
             ) from None
     if study.kind == "cell":
         return "hifi.study_cases:solve_cell_case", cell_tables(
