@@ -30,7 +30,7 @@ from pneunet.reduced.rod.overlap import overlap_doubts
 from pneunet.reduced.rod.prediction import doubts
 
 log = logging.getLogger(__name__)
-STEPS = 5
+STEPS, FILM = 5, "inflation.gif"
 FRAMES = 24
 FRAME_PIXELS, PANEL_PIXELS = (540, 432), (600, 480)
 #: of a frame
@@ -142,8 +142,8 @@ def _pictures(design, shapes, folder):
     highest = max(shapes)
     if highest > 0:
         log.info(f"{FRAMES} frames of the inflation follow")
-        _animation(design, highest, folder / "inflation.gif")
-        log.info(f"inflation from 0 to {plain(highest)} kPa: {folder / 'inflation.gif'}")
+        _animation(design, highest, folder / FILM)
+        log.info(f"inflation from 0 to {plain(highest)} kPa: {folder / FILM}")
 
 
 def _bodies(design, lines):
