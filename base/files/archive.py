@@ -42,7 +42,8 @@ class Member:
             raise InputError(f"its type is of kind '{kind}', not '{self.kinds}'")
         if len(shape) == len(self.shape):
             for size, name in zip(shape, self.shape):
-                sizes.setdefault(str(name), size)
+                if isinstance(name, str) and "+" not in name:
+                    sizes.setdefault(name, size)
         wanted = tuple(_size(each, sizes) for each in self.shape)
         if shape != wanted:
             raise InputError(f"has shape {shape}, not {wanted}")

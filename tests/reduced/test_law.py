@@ -203,6 +203,16 @@ def test_an_uncertain_grid_widens_error_bars_where_the_pressure_hardly_rises(tra
         )
 
 
+def test_a_point_that_is_missing_in_a_file_is_seen(trained, tmp_path):
+    """Weights are as many as points and shifts: sizes that are sums."""
+    with np.load(trained[1] / "law.npz") as stored:
+        arrays = dict(stored)
+    name = f"{TWISTING}/path/inducing"
+    np.savez(tmp_path / "law.npz", **(arrays | {name: arrays[name][:-1]}))
+    with pytest.raises(InputError, match="weights': has shape .* make it again with pneunet train"):
+        read_law(tmp_path / "law.npz")
+
+
 def test_a_file_gives_the_same_law(trained):
     law, folder = trained
     again = read_law(folder / "law.npz")
