@@ -64,7 +64,7 @@ PAGES = {
         " of points is enough; a TOML says more (how the base is held, silicones, what can be cast,"
         " several shapes). Writes design.toml, target.csv, split.toml, centreline.csv, design.png and"
         " run.json, when the design is found. Ends with exit code 3 where the design does not follow"
-        " its target. Some seconds; minutes under gravity.",
+        " its target. Some seconds; ten times as long under gravity.",
         (
             ("pneunet design my_curve.csv -o out/mine", "points in mm, from base to tip"),
             ("pneunet design octopus", "a target that comes along, into out/octopus"),

@@ -179,7 +179,7 @@ class _Search:
         self.mapping = mapping
         self.target, self.pieces, self.law, self.objective = target, pieces, law, objective
         self.optima, self.pace = [], Pace()
-        self.loaded = any(target.gravity)  # a hundred times the cost: no alternatives, no price of flushness
+        self.loaded = any(target.gravity)  # ten times the cost: no alternatives, no price of flushness
         self.most = most if objective == PAIRED and not self.loaded else 0
         self.floor, self.evaluations = (FINE_ENOUGH * target.length) ** 2, 0
         self.guesses = guesses(target, pieces, law)
