@@ -48,8 +48,8 @@ class FreeSection(ABC):
 
     def __init__(self, law: str) -> None:
         self._refusal = (
-            f"the law '{law}' knows free shapes alone, no forces and no stiffness: for a rod under load take"
-            " the trained law, or a QuadraticLaw of a unit cell's states"
+            f"the law '{law}' knows free shapes alone, no forces and no stiffness: for a rod under load, or"
+            " [loads] of a design, take the trained law, or a QuadraticLaw of a unit cell's states"
         )
 
     @abstractmethod

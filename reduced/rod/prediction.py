@@ -1,12 +1,10 @@
 """What a law says of a whole manipulator: its shape, free or under dead loads, and reasons to doubt it."""
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pneunet.base.errors import located
 from pneunet.base.strains import RodStrains
 from pneunet.geometry.designfile import DesignFile
 from pneunet.geometry.loading import DeadLoads
@@ -46,8 +44,7 @@ def predict_design(
     design: DesignFile, pressure: float | ArrayLike, law: SegmentLaw, spacing: float = 1.0
 ) -> Centreline:
     """`predict` of a design, in the target's coordinates and under the design's own loads."""
-    with located("[loads]") if design.loads else nullcontext():
-        return predict(design.manipulator, pressure, law, spacing, design.base_pose, design.loads)
+    return predict(design.manipulator, pressure, law, spacing, design.base_pose, design.loads)
 
 
 def segment_strains(manipulator: Manipulator, line: Centreline) -> RodStrains:
