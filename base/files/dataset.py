@@ -228,15 +228,12 @@ def _require_lists(about):
     lists = ("shape", "stiffening", "statuses", "revisions")
     wrong: list[Any] = [key for key in lists if not isinstance(about.get(key), list)]
     words = [word for key in lists if key not in wrong for word in about[key]]
-    wrong += [kind for kind in about["kinds"] if not isinstance(kind, str) or kind not in FORBIDDEN]
+    kinds = [kind for kind in FORBIDDEN if kind in about["kinds"]]
+    wrong += [kind for kind in about["kinds"] if kind not in kinds]
     wrong += [mesh for mesh in about["meshes"] if not _is_mesh(mesh)]
     wrong += [] if "done" in about["statuses"] else ["statuses"]
     wrong += [word for word in words if not isinstance(word, str)]
-    wrong += (
-        []
-        if wrong
-        else [kind for kind in about["kinds"] if not _is_matrix(about["directions"].get(kind, []), about)]
-    )
+    wrong += [kind for kind in kinds if not _is_matrix(about["directions"].get(kind, []), about)]
     wrong += [] if isinstance(about["campaign"].get("designs", 0), int) else ["designs"]
     if wrong:
         raise InputError(f"member 'about': {str(wrong[0])[:80]!r} is not understood: {FIX}")
@@ -244,9 +241,7 @@ def _require_lists(about):
 
 def _is_mesh(mesh):
     """Whether it has a name, and sizes that are numbers."""
-    if not isinstance(mesh, dict) or not {"name", "mesh_size_mm"} <= mesh.keys():
-        return False
-    if not isinstance(mesh["name"], str):
+    if not isinstance(mesh, dict) or "mesh_size_mm" not in mesh or not isinstance(mesh.get("name"), str):
         return False
     return all(isinstance(value, Real) for key, value in mesh.items() if key.endswith("_mm"))
 

@@ -29,8 +29,8 @@ def predict(
     """The Centreline of a manipulator at `pressure` (MPa; one for all, or one for each group of segments),
     end effects included: that of Rod.of, of a free one without the rod.
 
-    law: one for all segments or one for each. spacing in mm; base_pose (4, 4) the base frame, default the
-    identity; loads: in its coordinates, by default none. InputError and ConvergenceError as for
+    law: one for all segments or one for each. spacing in mm; base_pose (4, 4) the base frame in space, mm,
+    default the identity; loads: fixed in space, by default none. InputError and ConvergenceError as for
     SegmentLaw.strains, under loads as for Rod.equilibrium.
     """
     if loads:

@@ -376,11 +376,8 @@ def test_quadratic_law_has_consistent_derivatives_and_shapes():
     )
     rng, step = np.random.default_rng(5), 1e-6
     q, P = HELICAL + 0.01 * rng.standard_normal((4, 6)), np.array([0.0, 0.01, 0.03, 0.05])
-    assert (
-        states.psi(q, P).shape == (4,)
-        and states.force(q, P).shape == (4, 6)
-        and states.stiffness(q, P).shape == (4, 6, 6)
-    )
+    found = states.psi(q, P), states.force(q, P), states.stiffness(q, P)
+    assert [each.shape for each in found] == [(4,), (4, 6), (4, 6, 6)]
     for i, d in enumerate(step * np.eye(6)):
         for value, slope in (
             (states.psi, states.force(q, P)[:, i]),
